@@ -1,0 +1,345 @@
+"""The finite Markov decision process that planning and tabular learning work on.
+
+Few states follow any one state and action (a grid world: two or three), so a model keeps them in
+short rows instead of an S × S matrix per action: at 10⁶ states it takes megabytes, not terabytes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rl_core.compiled import compiled
+from rl_core.toy_text import check_distribution, read_table, start_arrays
+
+SUM_TOLERANCE = 1e-9
+"""How far probabilities may add up to from 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class MDP:
+    """A finite Markov decision process with S states, A actions and at most K successors.
+
+    Slot k of state s and action a says: with probability `probability[s, a, k]` the next state is
+    s' = `successor[s, a, k]` and the reward is `reward[s, a, k]`; the dynamics are
+    p(s', r | s, a) of Sutton & Barto, section 3.1. The discount γ is not part of the model: it is
+    an argument of the planner or learner.
+
+    Arrays are checked when the model is made, and kept as read-only views (they are copied only if
+    their type has to be converted).
+
+    Attributes
+    ----------
+    successor : ndarray of int32, shape (S, A, K)
+        The states that may follow. Unused slots hold the state itself with probability 0.
+    probability : ndarray of float64, shape (S, A, K)
+        Rows sum to 1. It may be a broadcast view: a maze has one row for all its states.
+    reward : ndarray of float64, shape (S, A, K)
+        The reward of each transition.
+    terminal : ndarray of bool, shape (S,)
+        Terminal states absorb: every successor is the state itself, every reward is 0.
+    start_state : ndarray of int32, shape (M,)
+        The states an episode may start in.
+    start_probability : ndarray of float64, shape (M,)
+        Their probabilities, which sum to 1.
+
+    Raises
+    ------
+    ValueError
+        If an array has the wrong shape or type, probabilities lie outside [0, 1] or do not sum to 1
+        (within 1e-9), a state is out of range, a reward is not finite, or a terminal state does not
+        absorb. The message names the argument, the state, the action and the value.
+
+    Notes
+    -----
+    To sample with one uniform u in [0, 1), take the first k with
+    `cumsum(probability[s, a])[k] > u` (the first slot, if rounding leaves none). On a model from
+    `from_env` this draws what Gymnasium's toy-text environments draw from the same u.
+
+    Examples
+    --------
+    One state in which the only action pays 1 and ends the episode with probability 1/2:
+
+    >>> model = MDP(
+    ...     successor=[[[0, 1]], [[1, 1]]],
+    ...     probability=[[[0.5, 0.5]], [[0.5, 0.5]]],
+    ...     reward=[[[1.0, 1.0]], [[0.0, 0.0]]],
+    ...     terminal=[False, True],
+    ...     start_state=[0],
+    ...     start_probability=[1.0],
+    ... )
+    >>> model.n_states, model.n_actions, model.n_successors
+    (2, 1, 2)
+    """
+
+    successor: NDArray[np.int32]
+    probability: NDArray[np.float64]
+    reward: NDArray[np.float64]
+    terminal: NDArray[np.bool_]
+    start_state: NDArray[np.int32]
+    start_probability: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        for name, dtype, ndim in (
+            ("successor", np.int32, 3),
+            ("probability", np.float64, 3),
+            ("reward", np.float64, 3),
+            ("terminal", np.bool_, 1),
+            ("start_state", np.int32, 1),
+            ("start_probability", np.float64, 1),
+        ):
+            object.__setattr__(self, name, _as_array(name, getattr(self, name), dtype, ndim))
+        self._check_shapes()
+        self._check_transitions()
+        self._check_start()
+
+    @property
+    def n_states(self) -> int:
+        """The number of states S, terminal ones included."""
+        return int(self.successor.shape[0])
+
+    @property
+    def n_actions(self) -> int:
+        """The number of actions A."""
+        return int(self.successor.shape[1])
+
+    @property
+    def n_successors(self) -> int:
+        """The number of slots K per state and action."""
+        return int(self.successor.shape[2])
+
+    @property
+    def nbytes(self) -> int:
+        """Memory the arrays take, in bytes; what a broadcast view repeats is counted once."""
+        total = 0
+        for name in self.__dataclass_fields__:
+            array: NDArray[Any] = getattr(self, name)
+            held = [n for n, stride in zip(array.shape, array.strides, strict=True) if stride]
+            total += array.itemsize * int(np.prod(held))
+        return total
+
+    def reachable_states(self) -> NDArray[np.bool_]:
+        """Mark the states some policy can be in: those reached from the start states.
+
+        Returns
+        -------
+        ndarray of bool, shape (S,)
+            True where a path of transitions of positive probability leads.
+
+        Examples
+        --------
+        >>> MDP.from_env("FrozenLake-v1").reachable_states().all()
+        np.True_
+        """
+        start = self.start_state[self.start_probability > 0]
+        return _reachable(self.successor, self.probability, start)
+
+    @classmethod
+    def from_env(
+        cls, env: str | gym.Env[Any, Any], start_distribution: ArrayLike | None = None
+    ) -> MDP:
+        """Read the model of a Gymnasium environment with a transition table.
+
+        The table is `P[s][a] = [(probability, next state, reward, terminated), ...]`, as in
+        FrozenLake, CliffWalking and Taxi. The slots keep the order of these rows. An environment
+        that makes its own model, as the Maze does, is asked for it.
+
+        Gymnasium marks the end of an episode on the transition, an `MDP` on the state entered. A
+        state becomes terminal if every transition into it from another state is terminated (and
+        no episode starts in it), or if it already absorbs with reward 0. Where a terminated
+        transition leads into any other state, one that can also be entered while the episode goes
+        on, it is redirected to an extra terminal state appended with index S: so Taxi's 500 states
+        become 501. Time limits are truncations, not part of the dynamics; they are ignored.
+
+        Parameters
+        ----------
+        env : str or gymnasium.Env
+            An id for `gymnasium.make`, or an environment, wrapped or not.
+        start_distribution : array of float, shape (S,), optional
+            The probability that an episode starts in each state. By default the environment's
+            `initial_state_distrib`, or all on its `start_state_index`.
+
+        Raises
+        ------
+        TypeError
+            If `env` is neither an id nor an environment.
+        ValueError
+            If the environment has no table, the table lacks a state or an action, the start
+            distribution is missing or of the wrong shape, or the model's own checks fail.
+
+        Examples
+        --------
+        >>> lake = MDP.from_env("FrozenLake-v1")
+        >>> lake.successor.shape, np.flatnonzero(lake.terminal).tolist()
+        ((16, 4, 3), [5, 7, 11, 12, 15])
+        """
+        if isinstance(env, str):
+            with gym.make(env) as made:
+                return cls.from_env(made, start_distribution)
+        if not isinstance(env, gym.Env):
+            raise TypeError(f"env must be an id or a gymnasium.Env, not {type(env).__name__}")
+        own_model = getattr(env.unwrapped, "model", None)
+        model = own_model() if callable(own_model) else None
+        if not isinstance(model, cls):
+            return cls(**read_table(env.unwrapped, start_distribution))
+        if start_distribution is None:
+            return model
+        start = check_distribution(start_distribution, model.n_states)
+        return replace(model, **start_arrays(start))
+
+    def _check_shapes(self) -> None:
+        shape = self.successor.shape
+        if 0 in shape:
+            raise ValueError(f"successor must have no empty axis, its shape is {shape}")
+        for name in ("probability", "reward"):
+            if getattr(self, name).shape != shape:
+                raise ValueError(
+                    f"{name} must have the shape of successor, {shape}, "
+                    f"not {getattr(self, name).shape}"
+                )
+        if self.terminal.shape != shape[:1]:
+            raise ValueError(f"terminal must have shape {shape[:1]}, not {self.terminal.shape}")
+        if not 0 < len(self.start_state) == len(self.start_probability):
+            raise ValueError(
+                "start_state and start_probability must have the same length, at least 1, "
+                f"not {len(self.start_state)} and {len(self.start_probability)}"
+            )
+
+    def _check_transitions(self) -> None:
+        """Raise on the first state, action and slot that breaks a rule."""
+        fault, s, a, k = _first_fault(
+            self.successor, self.probability, self.reward, self.terminal, SUM_TOLERANCE
+        )
+        if fault == _SOUND:
+            return
+        where = f"at state {s}, action {a}"
+        slot = f"{where}, slot {k}"
+        if fault == _BAD_PROBABILITY:
+            message = f"probability must lie in [0, 1], {slot} it is {self.probability[s, a, k]}"
+        elif fault == _BAD_SUM:
+            message = (
+                f"probability must sum to 1, {where} the sum is {self.probability[s, a].sum()}"
+            )
+        elif fault == _BAD_SUCCESSOR:
+            message = (
+                f"successor must lie in 0..{self.n_states - 1}, "
+                f"{slot} it is {self.successor[s, a, k]}"
+            )
+        elif fault == _BAD_REWARD:
+            message = f"reward must be finite, {slot} it is {self.reward[s, a, k]}"
+        elif fault == _LEAVES_TERMINAL:
+            message = (
+                "successor of a terminal state must be the state itself, "
+                f"{slot} it is {self.successor[s, a, k]}"
+            )
+        else:
+            message = f"reward of a terminal state must be 0, {slot} it is {self.reward[s, a, k]}"
+        raise ValueError(message)
+
+    def _check_start(self) -> None:
+        for i, state in enumerate(self.start_state.tolist()):
+            if not 0 <= state < self.n_states:
+                raise ValueError(
+                    f"start_state must lie in 0..{self.n_states - 1}, entry {i} is {state}"
+                )
+        for i, probability in enumerate(self.start_probability.tolist()):
+            if not 0 <= probability <= 1:
+                raise ValueError(
+                    f"start_probability must lie in [0, 1], entry {i} is {probability}"
+                )
+        total = float(self.start_probability.sum())
+        if abs(total - 1) > SUM_TOLERANCE:
+            raise ValueError(f"start_probability must sum to 1, the sum is {total!r}")
+
+
+def _as_array(name: str, values: ArrayLike, dtype: type[np.generic], ndim: int) -> NDArray[Any]:
+    """Return a read-only view of `values`; convert its type only if no value changes by it."""
+    try:
+        given = np.asarray(values)
+    except ValueError as error:  # ragged nesting
+        raise ValueError(f"{name} must be an array with {ndim} axes: {error}") from error
+    if given.ndim != ndim:
+        raise ValueError(f"{name} must have {ndim} axes, its shape is {given.shape}")
+    kinds = {np.int32: "iu", np.float64: "iuf", np.bool_: "b"}[dtype]
+    if given.dtype.kind not in kinds:
+        raise ValueError(f"{name} must be of type {dtype.__name__}, not {given.dtype}")
+    array = given.astype(dtype, copy=False)
+    if dtype is np.int32 and array is not given and not np.array_equal(array, given):
+        wrong = int(given[array != given][0])
+        raise ValueError(f"{name} must hold state indices below 2**31, it holds {wrong}")
+    view = array.view()
+    view.setflags(write=False)
+    return view
+
+
+(
+    _SOUND,
+    _BAD_PROBABILITY,
+    _BAD_SUM,
+    _BAD_SUCCESSOR,
+    _BAD_REWARD,
+    _LEAVES_TERMINAL,
+    _PAYS_IN_TERMINAL,
+) = range(7)
+
+
+@compiled
+def _first_fault(
+    successor: NDArray[np.int32],
+    probability: NDArray[np.float64],
+    reward: NDArray[np.float64],
+    terminal: NDArray[np.bool_],
+    tolerance: float,
+) -> tuple[int, int, int, int]:
+    """Return the first broken rule with its state, action and slot, or `_SOUND`."""
+    n_states, n_actions, n_successors = successor.shape
+    for s in range(n_states):
+        for a in range(n_actions):
+            total = 0.0
+            for k in range(n_successors):
+                p = probability[s, a, k]
+                if not (0.0 <= p <= 1.0):  # catches NaN too
+                    return _BAD_PROBABILITY, s, a, k
+                if not (0 <= successor[s, a, k] < n_states):
+                    return _BAD_SUCCESSOR, s, a, k
+                if not np.isfinite(reward[s, a, k]):
+                    return _BAD_REWARD, s, a, k
+                if terminal[s] and successor[s, a, k] != s:
+                    return _LEAVES_TERMINAL, s, a, k
+                if terminal[s] and reward[s, a, k] != 0.0:
+                    return _PAYS_IN_TERMINAL, s, a, k
+                total += p
+            if abs(total - 1.0) > tolerance:
+                return _BAD_SUM, s, a, 0
+    return _SOUND, 0, 0, 0
+
+
+@compiled
+def _reachable(
+    successor: NDArray[np.int32], probability: NDArray[np.float64], start: NDArray[np.int32]
+) -> NDArray[np.bool_]:
+    """Mark what a depth-first search from `start` finds."""
+    n_states, n_actions, n_successors = successor.shape
+    reached = np.zeros(n_states, dtype=np.bool_)
+    waiting = np.empty(n_states, dtype=np.int32)  # every state waits at most once
+    n_waiting = 0
+    for s in start:
+        if not reached[s]:
+            reached[s] = True
+            waiting[n_waiting] = s
+            n_waiting += 1
+    while n_waiting > 0:
+        n_waiting -= 1
+        s = waiting[n_waiting]
+        for a in range(n_actions):
+            for k in range(n_successors):
+                following = successor[s, a, k]
+                if probability[s, a, k] > 0.0 and not reached[following]:
+                    reached[following] = True
+                    waiting[n_waiting] = following
+                    n_waiting += 1
+    return reached
