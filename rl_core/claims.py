@@ -1,0 +1,236 @@
+"""The claims of the report: criteria fixed beforehand, evidence, verdicts, one table of them all.
+
+A claim is one statement of the report. Its criteria say, before any data is seen, between which
+bounds a measured quantity has to lie. The verdict follows from the interval of that quantity alone:
+no one decides it after looking.
+"""
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import pandas as pd
+
+Answer = Literal["yes", "no", "open"]
+Verdict = Literal["holds", "holds in part", "does not hold", "cannot tell"]
+COLUMNS = (
+    *("id", "section", "claim", "criterion", "estimate", "low", "high"),
+    *("seeds", "verdict", "figure"),
+)
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """A measured quantity with its 95% interval over seeds.
+
+    Attributes
+    ----------
+    estimate, low, high : float
+        The quantity and its interval; a quantity that does not depend on chance has no width.
+    seeds : int
+        How many seeds stand behind it; 0 where nothing is random.
+    """
+
+    estimate: float
+    low: float
+    high: float
+    seeds: int
+
+    def __post_init__(self) -> None:
+        if not self.low <= self.estimate <= self.high:
+            raise ValueError(
+                "an interval must hold its estimate: low <= estimate <= high, "
+                f"not {self.low}, {self.estimate}, {self.high}"
+            )
+        if self.seeds < 0:
+            raise ValueError(f"seeds must not be negative, not {self.seeds}")
+
+    @classmethod
+    def exact(cls, value: float) -> "Evidence":
+        """Evidence in which nothing is random."""
+        return cls(value, value, value, seeds=0)
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """Between which bounds a quantity has to lie.
+
+    Attributes
+    ----------
+    text : str
+        The criterion in words, with the quantity, its unit and the bound.
+    at_least, at_most : float
+        The bounds, both included.
+    """
+
+    text: str
+    at_least: float = -math.inf
+    at_most: float = math.inf
+
+    def answer(self, evidence: Evidence) -> Answer:
+        """Say "yes" if the whole interval is within the bounds, "no" if all of it is outside.
+
+        Examples
+        --------
+        >>> criterion = Criterion("at most 100 steps", at_most=100)
+        >>> criterion.answer(Evidence(90, 80, 99, seeds=30))
+        'yes'
+        >>> criterion.answer(Evidence(90, 80, 110, seeds=30))
+        'open'
+        """
+        if self.at_least <= evidence.low and evidence.high <= self.at_most:
+            return "yes"
+        if evidence.high < self.at_least or self.at_most < evidence.low:
+            return "no"
+        return "open"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A statement of the report and what would bear it out.
+
+    Attributes
+    ----------
+    id : str
+        Its name in the list of claims, such as "1a".
+    section : str
+        Where the report says it.
+    claim : str
+        What it says.
+    criteria : tuple of Criterion
+        What has to be true, all of it; the first is the one whose estimate stands in the table.
+    figure : str
+        The figure or table to look at.
+    """
+
+    id: str
+    section: str
+    claim: str
+    criteria: tuple[Criterion, ...]
+    figure: str
+
+    def judge(self, *evidence: Evidence) -> "Finding":
+        """Hold the evidence, one piece a criterion, against the criteria.
+
+        All answers yes: the claim holds. All no: it does not. Some yes, others not: it holds in
+        part. Otherwise the data cannot tell.
+
+        Raises
+        ------
+        ValueError
+            If there is not exactly one piece of evidence for each criterion.
+
+        Examples
+        --------
+        >>> claim = Claim("0", "0", "Steps are few.", (Criterion("<= 9", at_most=9),), "Figure 0")
+        >>> claim.judge(Evidence.exact(7)).verdict
+        'holds'
+        """
+        if len(evidence) != len(self.criteria):
+            raise ValueError(
+                f"claim {self.id} has {len(self.criteria)} criteria, not {len(evidence)}"
+            )
+        answers = tuple(c.answer(e) for c, e in zip(self.criteria, evidence, strict=True))
+        return Finding(self, evidence, answers)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A claim with its evidence."""
+
+    claim: Claim
+    evidence: tuple[Evidence, ...]
+    answers: tuple[Answer, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the answers come to."""
+        if all(answer == "yes" for answer in self.answers):
+            return "holds"
+        if all(answer == "no" for answer in self.answers):
+            return "does not hold"
+        return "holds in part" if "yes" in self.answers else "cannot tell"
+
+    def row(self) -> dict[str, object]:
+        """Give the finding as a row of the table of claims."""
+        first = self.evidence[0]
+        return {
+            "id": self.claim.id,
+            "section": self.claim.section,
+            "claim": self.claim.claim,
+            "criterion": "; ".join(criterion.text for criterion in self.claim.criteria),
+            "estimate": first.estimate,
+            "low": first.low,
+            "high": first.high,
+            "seeds": first.seeds,
+            "verdict": self.verdict,
+            "figure": self.claim.figure,
+        }
+
+
+def details(findings: Sequence[Finding]) -> pd.DataFrame:
+    """One row for each criterion of each claim: what was asked, what was measured, the answer."""
+    return pd.DataFrame(
+        [
+            {
+                "id": finding.claim.id,
+                "criterion": criterion.text,
+                "estimate": evidence.estimate,
+                "low": evidence.low,
+                "high": evidence.high,
+                "seeds": evidence.seeds,
+                "met": answer,
+            }
+            for finding in findings
+            for criterion, evidence, answer in zip(
+                finding.claim.criteria, finding.evidence, finding.answers, strict=True
+            )
+        ]
+    )
+
+
+def record(findings: Sequence[Finding], folder: Path, *, chapter: str) -> pd.DataFrame:
+    """Write a chapter's findings, and `claims.csv` anew from those of all chapters so far.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+        The chapter's findings.
+    folder : Path
+        Where the results are; `claims/<chapter>.csv` and `claims.csv` are written in it, each at
+        once or not at all.
+    chapter : str
+        The chapter's name, which orders the parts.
+
+    Returns
+    -------
+    pandas.DataFrame
+        The chapter's rows, with the columns of `claims.csv`.
+
+    Raises
+    ------
+    ValueError
+        If a claim is given twice, here or in another chapter.
+    """
+    rows = pd.DataFrame([finding.row() for finding in findings], columns=list(COLUMNS))
+    parts = folder / "claims"
+    parts.mkdir(parents=True, exist_ok=True)
+    others = [path for path in sorted(parts.glob("*.csv")) if path.stem != chapter]
+    known = {path.stem: pd.read_csv(path, dtype={"id": str, "section": str}) for path in others}
+    known[chapter] = rows
+    everything = pd.concat([known[name] for name in sorted(known)], ignore_index=True)
+    twice = everything.loc[everything["id"].duplicated(), "id"].tolist()
+    if twice:
+        raise ValueError(f"claims judged more than once: {', '.join(twice)}")
+    _write_atomically(rows, parts / f"{chapter}.csv")
+    _write_atomically(everything, folder / "claims.csv")
+    return rows
+
+
+def _write_atomically(table: pd.DataFrame, path: Path) -> None:
+    unfinished = path.with_name(f"{path.name}.{os.getpid()}.tmp")
+    table.to_csv(unfinished, index=False)
+    os.replace(unfinished, path)

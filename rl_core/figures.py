@@ -1,0 +1,190 @@
+"""What the drawings of all chapters share: one look, one set of colours, one way to show a film."""
+
+import base64
+import hashlib
+import html
+import subprocess
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+import imageio_ffmpeg
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from cycler import cycler
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+from pandas.io.formats.style import Styler
+
+# Okabe & Ito (2008), "Color universal design": told apart with every common colour blindness.
+BLACK = "#000000"
+ORANGE = "#E69F00"
+SKY_BLUE = "#56B4E9"
+GREEN = "#009E73"
+YELLOW = "#F0E442"
+BLUE = "#0072B2"
+VERMILLION = "#D55E00"
+PURPLE = "#CC79A7"
+GREY = "#767676"
+COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY_BLUE, BLACK)
+LINES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)))
+
+
+def use_style() -> None:
+    """Set matplotlib's defaults for the book: sizes that stay legible on a phone, few inks.
+
+    Lines differ in colour and in dash pattern, so that a black-and-white print can be read too.
+
+    Examples
+    --------
+    >>> use_style()
+    >>> mpl.rcParams["axes.spines.top"]
+    False
+    """
+    mpl.rcParams.update(
+        {
+            "figure.figsize": (6.4, 3.8),
+            "figure.dpi": 100,
+            "savefig.dpi": 200,
+            "savefig.bbox": "tight",
+            "figure.constrained_layout.use": True,
+            "figure.facecolor": "white",
+            "font.family": "DejaVu Sans",  # ships with matplotlib: the same everywhere
+            "font.size": 11,
+            "axes.titlesize": 11,
+            "axes.titleweight": "bold",
+            "axes.titlelocation": "left",
+            "axes.spines.top": False,
+            "axes.spines.right": False,
+            "axes.grid": True,
+            "axes.axisbelow": True,
+            "grid.color": "#dddddd",
+            "grid.linewidth": 0.6,
+            "legend.frameon": False,
+            "legend.fontsize": 10,
+            "lines.linewidth": 1.8,
+            "axes.prop_cycle": cycler(color=COLOURS) + cycler(linestyle=LINES),
+        }
+    )
+
+
+def label(axes: Axes, *, x: str, y: str, title: str = "") -> None:
+    """Name both axes (with units) and the panel."""
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    if title:
+        axes.set_title(title)
+
+
+def captioned(
+    table: pd.DataFrame,
+    caption: str,
+    *,
+    formats: Mapping[str, str] | None = None,
+    boldest: Sequence[str] = (),
+) -> Styler:
+    """Show a table with a caption and without its row numbers.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        What to show.
+    caption : str
+        The caption, with the table's number.
+    formats : mapping of str to str, optional
+        A format for a column's numbers, such as "{:.2f}".
+    boldest : sequence of str
+        Columns among which the largest of each row is set in bold.
+
+    Examples
+    --------
+    >>> numbers = pd.DataFrame({"x": [0.123, 4.5]})
+    >>> page = captioned(numbers, "Table 0. Numbers.", formats={"x": "{:.1f}"}).to_html()
+    >>> "Table 0. Numbers." in page, "4.5" in page, "0.123" in page
+    (True, True, False)
+    """
+    # A fixed id: the same table gives the same page.
+    styled = table.style.set_uuid(hashlib.sha256(caption.encode()).hexdigest()[:8])
+    styled = styled.set_caption(caption).hide(axis="index").format(dict(formats or {}))
+    if boldest:
+        styled = styled.highlight_max(subset=list(boldest), axis=1, props="font-weight: bold")
+    return styled
+
+
+class Film:
+    """A silent film that a notebook shows as an HTML video, its data inside the page.
+
+    H.264 in 4:2:0, which every browser plays. It starts when the reader asks for it: nothing moves
+    on a page unasked. The description is read out by screen readers.
+
+    Parameters
+    ----------
+    frames : iterable of ndarray of uint8, shape (height, width, 3)
+        The pictures, all of one size; an odd last row or column is cut off (the format needs even
+        sizes).
+    frames_per_second : float
+        Speed of play.
+    description : str
+        What the film shows, in words.
+
+    Raises
+    ------
+    ValueError
+        If there is no frame, a frame is not an RGB picture of the first one's size, or
+        `frames_per_second` is not positive.
+
+    Examples
+    --------
+    >>> black = np.zeros((32, 32, 3), np.uint8)
+    >>> film = Film([black, black + 255], frames_per_second=2, description="A flash.")
+    >>> film.mp4[4:8]
+    b'ftyp'
+    """
+
+    def __init__(
+        self,
+        frames: Iterable[NDArray[np.uint8]],
+        *,
+        frames_per_second: float,
+        description: str,
+    ) -> None:
+        if not frames_per_second > 0:
+            raise ValueError(f"frames_per_second must be positive, not {frames_per_second}")
+        pictures = [np.asarray(frame) for frame in frames]
+        if not pictures:
+            raise ValueError("frames is empty: a film needs at least one frame")
+        for number, picture in enumerate(pictures):
+            if picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] != 3:
+                raise ValueError(
+                    f"frame {number} must be uint8 (height, width, 3), "
+                    f"not {picture.dtype} {picture.shape}"
+                )
+            if picture.shape != pictures[0].shape:
+                raise ValueError(
+                    f"frame {number} has shape {picture.shape}, frame 0 {pictures[0].shape}"
+                )
+        self.description = description
+        self.mp4 = _encode(pictures, frames_per_second)
+
+    def _repr_html_(self) -> str:
+        data = base64.b64encode(self.mp4).decode()
+        text = html.escape(self.description, quote=True)
+        return (
+            f'<video controls loop muted playsinline preload="auto" aria-label="{text}" '
+            f'title="{text}" src="data:video/mp4;base64,{data}"></video>'
+        )
+
+
+def _encode(pictures: list[NDArray[np.uint8]], frames_per_second: float) -> bytes:
+    height, width = (side - side % 2 for side in pictures[0].shape[:2])
+    raw = b"".join(picture[:height, :width].tobytes() for picture in pictures)
+    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}"]
+    source += ["-r", f"{frames_per_second}", "-i", "-"]
+    codec = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "23", "-preset", "slow"]
+    with tempfile.TemporaryDirectory() as folder:
+        film = Path(folder) / "film.mp4"
+        command = [imageio_ffmpeg.get_ffmpeg_exe(), "-loglevel", "error", *source, *codec]
+        command += ["-movflags", "+faststart", str(film)]
+        subprocess.run(command, input=raw, check=True)
+        return film.read_bytes()

@@ -1,0 +1,72 @@
+"""Verdicts follow from intervals alone."""
+
+import pandas as pd
+import pytest
+
+from rl_core.claims import COLUMNS, Claim, Criterion, Evidence, details, record
+
+FEW = Criterion("at most 10", at_most=10)
+MANY = Criterion("at least 1", at_least=1)
+
+
+def claim(*criteria, name="1a"):
+    return Claim(name, "1.1", "Something is so.", criteria, "Figure 1")
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "answer"),
+    [(3, 10, "yes"), (11, 12, "no"), (9, 11, "open"), (10, 10, "yes"), (10.001, 11, "no")],
+)
+def test_a_criterion_looks_at_the_whole_interval(low, high, answer):
+    assert FEW.answer(Evidence(low, low, high, seeds=30)) == answer
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "verdict"),
+    [
+        ((5, 5), (5, 5), "holds"),
+        ((11, 12), (0, 0.5), "does not hold"),
+        ((5, 5), (0, 0.5), "holds in part"),
+        ((5, 5), (0, 2), "holds in part"),
+        ((9, 11), (0, 2), "cannot tell"),
+        ((9, 11), (0, 0.5), "cannot tell"),
+    ],
+)
+def test_verdicts(first, second, verdict):
+    evidence = [Evidence(low, low, high, seeds=30) for low, high in (first, second)]
+    assert claim(FEW, MANY).judge(*evidence).verdict == verdict
+
+
+def test_every_criterion_needs_its_evidence():
+    with pytest.raises(ValueError, match="claim 1a has 2 criteria, not 1"):
+        claim(FEW, MANY).judge(Evidence.exact(1))
+
+
+def test_impossible_intervals_are_refused():
+    with pytest.raises(ValueError, match="low <= estimate <= high, not 2, 1, 3"):
+        Evidence(1, 2, 3, seeds=30)
+    with pytest.raises(ValueError, match="low <= estimate"):
+        Evidence(float("nan"), 2, 3, seeds=30)
+
+
+def test_the_table_gathers_the_chapters_in_order(tmp_path):
+    second = claim(FEW, name="2a").judge(Evidence(4, 3, 5, seeds=30))
+    first = claim(FEW, MANY).judge(Evidence.exact(7), Evidence.exact(2))
+    record([second], tmp_path, chapter="2")
+    record([first], tmp_path, chapter="1")
+    rows = record([first], tmp_path, chapter="1")
+    table = pd.read_csv(tmp_path / "claims.csv")
+    assert list(table.columns) == list(COLUMNS)
+    assert table["id"].tolist() == ["1a", "2a"]
+    assert table.loc[0, "criterion"] == "at most 10; at least 1"
+    assert table.loc[1, ["estimate", "low", "high", "seeds"]].tolist() == [4, 3, 5, 30]
+    assert rows["verdict"].tolist() == ["holds"]
+    assert details([first])["met"].tolist() == ["yes", "yes"]
+
+
+def test_no_claim_is_judged_twice(tmp_path):
+    finding = claim(FEW).judge(Evidence.exact(7))
+    record([finding], tmp_path, chapter="1")
+    with pytest.raises(ValueError, match="judged more than once: 1a"):
+        record([finding], tmp_path, chapter="2")
+    assert len(pd.read_csv(tmp_path / "claims.csv")) == 1
