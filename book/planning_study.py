@@ -1,0 +1,322 @@
+"""Chapter 1: what the report claims about planning, what would bear it out, and how it is measured.
+
+The claims speak of one maze. Each is put to that maze, where the answer is exact, and to thirty
+random mazes, to see whether it is true of planning or only of that one maze.
+"""
+
+import time
+from collections.abc import Iterator
+from itertools import islice, pairwise
+
+import numpy as np
+import pandas as pd
+
+from rl_core.claims import Claim, Criterion, Evidence, Finding
+from rl_core.maze import ACTIONS, Maze, random_maze
+from rl_core.maze_figures import Move
+from rl_core.mdp import MDP
+from rl_core.planning import (
+    backup,
+    greedy_policy,
+    optimal_actions,
+    policy_evaluation,
+    policy_iteration,
+    q_value_iteration,
+    value_iteration,
+)
+from rl_core.statistics import bootstrap_interval
+
+GAMMA = 0.9
+THRESHOLD = 1e-5
+SEEDS = range(30)
+# Stopping at a difference of THRESHOLD leaves an error of at most gamma / (1 - gamma) times that.
+ERROR_BOUND = GAMMA / (1 - GAMMA) * THRESHOLD
+TIE = 1e-8
+
+CLAIMS = (
+    Claim(
+        "1a",
+        "1.1",
+        "Q-value iteration, stopped when successive tables differ by less than a threshold in "
+        "Frobenius norm, yields the optimal Q-values.",
+        (
+            Criterion(
+                "largest |Q - Q*| on the Maze at most gamma/(1 - gamma) times the threshold",
+                at_most=ERROR_BOUND,
+            ),
+            Criterion("the same, mean over random mazes", at_most=ERROR_BOUND),
+            Criterion("share of states with an optimal greedy action on the Maze is 1", at_least=1),
+        ),
+        "Figures 1-8, S1.1",
+    ),
+    Claim(
+        "1b",
+        "1.1",
+        "Policy iteration reaches the same optimal policy.",
+        (
+            Criterion("share of states with an optimal action on the Maze is 1", at_least=1),
+            Criterion("the same, mean over random mazes", at_least=1),
+        ),
+        "Table 1.2",
+    ),
+    Claim(
+        "1c",
+        "1.1",
+        "Policy iteration needs less computation per iteration than value iteration.",
+        (
+            Criterion(
+                "backups in a round of policy iteration at most those in a sweep of value "
+                "iteration, on the Maze (ratio at most 1)",
+                at_most=1,
+            ),
+            Criterion("the same, mean ratio over random mazes", at_most=1),
+        ),
+        "Table 1.2, S1.2",
+    ),
+    Claim(
+        "1d",
+        "1.1",
+        "Values much coarser than converged ones already give the optimal decisions.",
+        (
+            Criterion(
+                "when every decision is first right for good, the error of the values on the Maze "
+                "is at least 100 times the error at the end",
+                at_least=100,
+            ),
+            Criterion("the same, median over random mazes", at_least=100),
+        ),
+        "S1.3",
+    ),
+    Claim(
+        "1e",
+        "1.1",
+        "Q-values give the optimal action without a transition model; V-values need one.",
+        (
+            Criterion(
+                "argmax of Q*, no model used, is optimal in every state of the Maze (share 1)",
+                at_least=1,
+            ),
+            Criterion(
+                "share of the Maze's states in which no rule that sees only V* can be right both "
+                "on the Maze and on its twin with renamed actions, at least a half",
+                at_least=0.5,
+            ),
+            Criterion("the same, mean over random mazes", at_least=0.5),
+        ),
+        "Table 1.4",
+    ),
+)
+
+
+def mazes(seeds: range = SEEDS) -> dict[int, Maze]:
+    """Thirty random mazes of 8 x 8 cells with three flags, one a seed."""
+    return {
+        seed: random_maze(8, 8, flags=3, wall_fraction=0.25, rng=np.random.default_rng(seed))
+        for seed in seeds
+    }
+
+
+def sweeps(mdp: MDP, gamma: float) -> Iterator[np.ndarray]:
+    """The tables Q_1, Q_2, ... of Q-value iteration from Q_0 = 0, without end."""
+    Q = np.zeros((mdp.n_states, mdp.n_actions))
+    while True:
+        Q = backup(mdp, Q.max(axis=1), gamma=gamma)
+        yield Q
+
+
+def approach(mdp: MDP, Q_star: np.ndarray) -> pd.DataFrame:
+    """Follow Q-value iteration sweep by sweep, until no entry is wrong by more than 1e-9.
+
+    Columns: `sweep`; `error`, the largest of any entry; `percent_off`, the same as percentage of
+    the largest value; `decided`, the share of states whose greedy action is optimal.
+    """
+    best = optimal_actions(Q_star, tolerance=TIE)[~mdp.terminal]
+    rows = []
+    for sweep, Q in enumerate(sweeps(mdp, GAMMA), start=1):
+        choice = greedy_policy(Q)[~mdp.terminal]
+        right = best[np.arange(len(choice)), choice].mean()
+        rows.append({"sweep": sweep, "error": np.abs(Q - Q_star).max(), "decided": right})
+        if rows[-1]["error"] < 1e-9:
+            break
+    path = pd.DataFrame(rows)
+    path["percent_off"] = 100 * path["error"] / Q_star.max()
+    return path
+
+
+def approach_of(maze: Maze) -> pd.DataFrame:
+    """The approach of Q-value iteration to a maze's optimal values."""
+    mdp = maze.model()
+    return approach(mdp, value_iteration(mdp, gamma=GAMMA, tolerance=1e-10).Q)
+
+
+def renamed(mdp: MDP) -> MDP:
+    """The same model with the actions' names turned round: up means down, left means right."""
+    turned = [1, 0, 3, 2]
+    return MDP(
+        successor=mdp.successor[:, turned],
+        probability=mdp.probability[:, turned],
+        reward=mdp.reward[:, turned],
+        terminal=mdp.terminal,
+        start_state=mdp.start_state,
+        start_probability=mdp.start_probability,
+    )
+
+
+def misled(mdp: MDP) -> float:
+    """The share of states in which a decision from V* alone must be wrong in one of two worlds.
+
+    A model and its twin with renamed actions have the same V*. Where their optimal actions have
+    none in common, no rule that looks at V* alone is right in both.
+    """
+    one, other = (value_iteration(m, gamma=GAMMA, tolerance=1e-10) for m in (mdp, renamed(mdp)))
+    assert np.abs(one.V - other.V).max() < 1e-9
+    common = optimal_actions(one.Q, tolerance=TIE) & optimal_actions(other.Q, tolerance=TIE)
+    return float(1 - common.any(axis=1)[~mdp.terminal].mean())
+
+
+def route(maze: Maze, moves: list[Move]) -> str:
+    """In words: which flags an episode collects, in order, and where it ends."""
+    held = [maze.locate(move.next_state)[2] for move in moves]
+    steps = pairwise(["", *held])
+    taken = [flag for before, after in steps for flag in after if flag not in before]
+    return ", then ".join([f"flag {flag}" for flag in taken] + [f"the goal ({len(moves)} moves)"])
+
+
+def q_value_table(maze: Maze, Q: np.ndarray) -> pd.DataFrame:
+    """One row a state: where it is, which flags it holds, and the value of each action."""
+    places = [maze.locate(state) for state in range(len(Q))]
+    table = pd.DataFrame(places, columns=["row", "column", "flags"])
+    table.insert(0, "state", np.arange(len(Q)))
+    table["flags"] = table["flags"].replace("", "none")
+    return table.assign(**dict(zip(ACTIONS, Q.T, strict=True)))
+
+
+def measure(maze: Maze) -> dict[str, float]:
+    """Everything the claims ask of one maze."""
+    mdp = maze.model()
+    exact = value_iteration(mdp, gamma=GAMMA, tolerance=1e-10)
+    by_value = q_value_iteration(mdp, gamma=GAMMA, threshold=THRESHOLD)
+    by_policy = policy_iteration(mdp, gamma=GAMMA)
+    best = optimal_actions(exact.Q, tolerance=TIE)[~mdp.terminal]
+
+    def decided(policy: np.ndarray) -> float:
+        return float(best[np.arange(len(best)), policy[~mdp.terminal]].mean())
+
+    path = approach(mdp, exact.Q)
+    settled = path.loc[path["decided"] < 1, "sweep"].max() + 1
+    at_settling = path.loc[path["sweep"] == settled, "error"].item()
+    error = np.abs(by_value.Q - exact.Q).max()
+    measured = {
+        "error": error,
+        "decided": decided(by_value.policy),
+        "decided_pi": decided(by_policy.policy),
+        **cost_ratios(mdp),
+        "settled": settled,
+        "settled_error": at_settling,
+        "coarseness": at_settling / error,
+        "misled": misled(mdp),
+    }
+    return {name: float(value) for name, value in measured.items()}
+
+
+def findings(course: dict[str, float], sample: pd.DataFrame) -> list[Finding]:
+    """Hold the course's maze (exact) and the random mazes (an interval) against the criteria."""
+    rng = np.random.default_rng(np.random.SeedSequence(2018))
+
+    def on_mazes(measure: str, statistic=np.mean) -> Evidence:
+        interval = bootstrap_interval(sample[measure].to_numpy(), statistic, rng=rng)
+        return Evidence(*interval, seeds=len(sample))
+
+    def on_course(measure: str) -> Evidence:
+        return Evidence.exact(course[measure])
+
+    one_a, one_b, one_c, one_d, one_e = CLAIMS
+    return [
+        one_a.judge(on_course("error"), on_mazes("error"), on_course("decided")),
+        one_b.judge(on_course("decided_pi"), on_mazes("decided_pi")),
+        one_c.judge(on_course("round_cost"), on_mazes("round_cost")),
+        one_d.judge(on_course("coarseness"), on_mazes("coarseness", np.median)),
+        one_e.judge(Evidence.exact(1.0), on_course("misled"), on_mazes("misled")),
+    ]
+
+
+def verdicts(found: list[Finding]) -> pd.DataFrame:
+    """The findings in short."""
+    rows = pd.DataFrame([finding.row() for finding in found])
+    return rows[["id", "claim", "verdict", "figure"]]
+
+
+def cost_ratios(mdp: MDP) -> dict[str, float]:
+    """Work of policy iteration in terms of value iteration's: a round, and start to end.
+
+    Both count backups, so evaluation has to be by sweeps, stopped at the same threshold.
+    """
+    by_value = q_value_iteration(mdp, gamma=GAMMA, threshold=THRESHOLD).table
+    by_policy = policy_iteration(mdp, gamma=GAMMA, evaluation_threshold=THRESHOLD).table
+    work_by_value, work_by_policy = by_value["backups"].max(), by_policy["backups"].max()
+    return {
+        "round_cost": (work_by_policy / len(by_policy)) / (work_by_value / len(by_value)),
+        "whole_cost": work_by_policy / work_by_value,
+    }
+
+
+ACCURACY = 1e-10
+METHODS = {
+    "Q-value iteration (the report's)": lambda mdp: q_value_iteration(
+        mdp, gamma=GAMMA, threshold=ACCURACY * (1 - GAMMA) / GAMMA
+    ),
+    "value iteration in a good order": lambda mdp: value_iteration(
+        mdp, gamma=GAMMA, tolerance=ACCURACY
+    ),
+    "policy iteration, evaluation by sweeps": lambda mdp: policy_iteration(
+        mdp, gamma=GAMMA, evaluation_threshold=ACCURACY * (1 - GAMMA) / GAMMA
+    ),
+    "policy iteration, evaluation by linear solve": lambda mdp: policy_iteration(mdp, gamma=GAMMA),
+}
+
+
+def costs(mdp: MDP, repeats: int = 20) -> pd.DataFrame:
+    """What each method needs to find the values to within `ACCURACY`: sweeps, backups, time."""
+    rows = []
+    for method, solve in METHODS.items():
+        table = solve(mdp).table
+        times = []
+        for _ in range(repeats):
+            start = time.perf_counter()
+            solve(mdp)
+            times.append(time.perf_counter() - start)
+        evaluations = table.get("evaluation_sweeps", pd.Series([0])).sum()
+        rows.append(
+            {
+                "method": method,
+                "sweeps or rounds": len(table),
+                "evaluation sweeps": int(evaluations),
+                "linear solves": int(table.get("solves", pd.Series([0])).sum()),
+                "backups": int(table["backups"].max()),
+                "time (ms)": 1000 * float(np.median(times)),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def progress(mdp: MDP) -> dict[str, pd.DataFrame]:
+    """Error of V against backups done, for value iteration and for policy iteration.
+
+    Round n of policy iteration, which is deterministic, is seen by starting over and keeping
+    the values of its n-th policy.
+    """
+    V_star = value_iteration(mdp, gamma=GAMMA, tolerance=1e-12).V
+    by_value = q_value_iteration(mdp, gamma=GAMMA, threshold=THRESHOLD).table
+    by_policy = policy_iteration(mdp, gamma=GAMMA, evaluation_threshold=THRESHOLD).table
+    tables = islice(sweeps(mdp, GAMMA), len(by_value))
+    errors = [np.abs(Q.max(axis=1) - V_star).max() for Q in tables]
+    policy = greedy_policy(backup(mdp, np.zeros(mdp.n_states), gamma=GAMMA))
+    policy_errors = []
+    for _ in range(len(by_policy)):
+        V = policy_evaluation(mdp, policy, gamma=GAMMA)
+        policy_errors.append(np.abs(V - V_star).max())
+        policy = greedy_policy(backup(mdp, V, gamma=GAMMA))
+    return {
+        "value": by_value[["backups"]].assign(error=errors),
+        "policy": by_policy[["backups"]].assign(error=policy_errors),
+    }
