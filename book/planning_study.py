@@ -240,12 +240,6 @@ def findings(course: dict[str, float], sample: pd.DataFrame) -> list[Finding]:
     ]
 
 
-def verdicts(found: list[Finding]) -> pd.DataFrame:
-    """The findings in short."""
-    rows = pd.DataFrame([finding.row() for finding in found])
-    return rows[["id", "claim", "verdict", "figure"]]
-
-
 def cost_ratios(mdp: MDP) -> dict[str, float]:
     """Work of policy iteration in terms of value iteration's: a round, and start to end.
 

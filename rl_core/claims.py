@@ -171,6 +171,12 @@ class Finding:
         }
 
 
+def verdicts(findings: Sequence[Finding]) -> pd.DataFrame:
+    """One row for each claim: its verdict and where to look."""
+    rows = pd.DataFrame([finding.row() for finding in findings], columns=list(COLUMNS))
+    return rows[["id", "claim", "verdict", "figure"]]
+
+
 def details(findings: Sequence[Finding]) -> pd.DataFrame:
     """One row for each criterion of each claim: what was asked, what was measured, the answer."""
     return pd.DataFrame(

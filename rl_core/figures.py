@@ -16,6 +16,7 @@ from cycler import cycler
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 from pandas.io.formats.style import Styler
+from pandas.io.formats.style_render import CSSDict
 
 # Okabe & Ito (2008), "Color universal design": told apart with every common colour blindness.
 BLACK = "#000000"
@@ -84,7 +85,7 @@ def captioned(
     formats: Mapping[str, str] | None = None,
     boldest: Sequence[str] = (),
 ) -> Styler:
-    """Show a table with a caption and without its row numbers.
+    """Show a table with a caption and without its row numbers; words are set to the left.
 
     Parameters
     ----------
@@ -107,6 +108,9 @@ def captioned(
     # A fixed id: the same table gives the same page.
     styled = table.style.set_uuid(hashlib.sha256(caption.encode()).hexdigest()[:8])
     styled = styled.set_caption(caption).hide(axis="index").format(dict(formats or {}))
+    words = [i for i, kind in enumerate(table.dtypes) if not pd.api.types.is_numeric_dtype(kind)]
+    left = [CSSDict(selector=f".col{i}", props="text-align: left") for i in words]
+    styled = styled.set_table_styles(left)
     if boldest:
         styled = styled.highlight_max(subset=list(boldest), axis=1, props="font-weight: bold")
     return styled

@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from rl_core.claims import COLUMNS, Claim, Criterion, Evidence, details, record
+from rl_core.claims import COLUMNS, Claim, Criterion, Evidence, details, record, verdicts
 
 FEW = Criterion("at most 10", at_most=10)
 MANY = Criterion("at least 1", at_least=1)
@@ -62,6 +62,7 @@ def test_the_table_gathers_the_chapters_in_order(tmp_path):
     assert table.loc[1, ["estimate", "low", "high", "seeds"]].tolist() == [4, 3, 5, 30]
     assert rows["verdict"].tolist() == ["holds"]
     assert details([first])["met"].tolist() == ["yes", "yes"]
+    assert verdicts([first, second])["verdict"].tolist() == ["holds", "holds"]
 
 
 def test_no_claim_is_judged_twice(tmp_path):
