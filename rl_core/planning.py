@@ -1,0 +1,449 @@
+"""Planning: the optimal values and policy of a known model, by dynamic programming.
+
+The Bellman optimality equation (Sutton & Barto, section 3.6) is a fixed point,
+
+    Q*(s, a) = Σ_k p_k (r_k + γ max_a' Q*(s'_k, a')),
+
+where k runs over the successors of (s, a). Replacing Q by the right-hand side brings its largest
+error down by the factor γ: the right-hand side is a contraction. So
+
+- `q_value_iteration` repeats that step on the whole table: simplest, and the report's method;
+- `value_iteration` takes the states in a good order and guarantees an error (fastest);
+- `policy_iteration` alternates the values of a policy and a better policy.
+
+All of them return a `Plan`. Their cost is counted in *backups*: one is the evaluation of the
+right-hand side for one state and action.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_matrix, identity
+from scipy.sparse.linalg import splu
+
+from rl_core import plan, sweeps
+from rl_core.mdp import MDP
+from rl_core.plan import Plan, check_model, check_positive, greedy_policy, optimal_actions
+from rl_core.sweeps import TIE, Transitions
+
+__all__ = [
+    "Plan",
+    "backup",
+    "greedy_policy",
+    "optimal_actions",
+    "policy_evaluation",
+    "policy_iteration",
+    "q_value_iteration",
+    "value_iteration",
+]
+
+DIRECT_LIMIT = 20_000
+"""The most states for which equations are solved directly: the factors fill in, to gigabytes."""
+
+MAX_EVALUATIONS, ENOUGH = 8, 0.1
+"""After an improvement sweep come at most 8 evaluation sweeps; 0.1 of its residual is enough."""
+
+SLOW = 0.5
+"""If a residual is above this share of the last one's, the next improvement sweep is a backward
+one: it carries values through where the estimated order is the wrong way round."""
+
+MODIFIED_ROUNDS = 200
+"""After so many rounds the evaluation sweeps are left out: with them the sweeps converge faster in
+practice, without them each is a contraction, whatever the values."""
+
+
+def q_value_iteration(
+    mdp: MDP,
+    *,
+    gamma: float,
+    threshold: float = 1e-5,
+    max_sweeps: int | None = None,
+    progress: bool = True,
+) -> Plan:
+    """Repeat Q ← Σ_k p_k (r_k + γ max_a' Q(s'_k, a')) until Q hardly changes.
+
+    Sweeps are synchronous (each uses the table of the one before), start from Q = 0 and stop when
+    ||Q_new - Q_old||_F < `threshold`. Residual number k + 1 is at most γ^k times the first.
+
+    Parameters
+    ----------
+    mdp : MDP
+        The model.
+    gamma : float
+        Discount, in [0, 1).
+    threshold : float
+        Where to stop, above 0, in units of return.
+    max_sweeps : int, optional
+        Stop after so many sweeps in any case; the table's last `norm` then tells how far it was.
+    progress : bool
+        Show sweeps and bound on stderr once two seconds have passed.
+
+    Returns
+    -------
+    Plan
+        See there; `bound` is γ / (1 - γ) times the residual, and rounding.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument is out of range or has the wrong type.
+    ArithmeticError
+        If `threshold` is less than rounding lets the changes become.
+
+    Notes
+    -----
+    The method and the stopping rule of the report, section 1.1; for V, Sutton & Barto, section 4.4.
+
+    Examples
+    --------
+    >>> lake = MDP.from_env("FrozenLake-v1")
+    >>> q_value_iteration(lake, gamma=0.99, threshold=1e-9).Q[14].round(3).tolist()
+    [0.733, 0.863, 0.821, 0.781]
+    """
+    check_model(mdp, gamma)
+    check_positive("threshold", threshold)
+    if max_sweeps is not None:
+        plan.check_count("max_sweeps", max_sweeps)
+    limit: float = math.inf if max_sweeps is None else max_sweeps
+    transitions, reward = sweeps.arrays(mdp)
+    Q, V, policy = plan.blank(mdp)
+    largest, norm = float(np.abs(reward).max()), math.inf
+    with plan.recording("Q-value iteration", progress) as record:
+        while norm >= threshold and len(record.rows) < limit:
+            residual, squares = sweeps.lookahead(transitions, reward, gamma, V, Q)
+            _, _, changes = sweeps.greedy(Q, V, policy)
+            norm = math.sqrt(squares)
+            rounding = plan.rounding_error(mdp, max(largest, float(np.abs(V).max())))
+            record.add(residual, norm, changes, Q.size, plan.error_bound(residual, gamma, rounding))
+            if len(record.rows) == 1 and max_sweeps is None:
+                limit = 1 + plan.sweeps_needed(norm * math.sqrt(Q.size), threshold, gamma)
+    if norm >= threshold and max_sweeps is None:
+        raise ArithmeticError(
+            f"threshold {threshold} is below what rounding allows: after {len(record.rows)} sweeps "
+            f"the norm of the change is {norm:.1e}"
+        )
+    return Plan(Q, V, policy, record.table())
+
+
+def value_iteration(
+    mdp: MDP, *, gamma: float, tolerance: float = 1e-6, progress: bool = True
+) -> Plan:
+    """Find Q* and V* to within `tolerance`, with the states swept in the order values flow in.
+
+    What makes it fast, beside compiled code (`rl_core.sweeps`):
+
+    - *Order.* States are swept by falling value, as estimated beforehand by a search
+      backwards from the rewards; a sweep works in place and so carries values all the way.
+    - *No waiting.* The chance to stay in the same state is solved for instead of swept for.
+    - *Evaluation sweeps.* An improvement sweep, over all actions, is followed by up to eight
+      that follow its greedy actions only (modified policy iteration).
+
+    A last synchronous sweep writes Q and V = max_a Q: the table's row of kind "check".
+
+    Parameters
+    ----------
+    mdp : MDP
+        The model.
+    gamma : float
+        Discount, in [0, 1).
+    tolerance : float
+        Largest error allowed in any entry of Q and V, above 0, in units of return.
+    progress : bool
+        Show sweeps and bound on stderr once two seconds have passed.
+
+    Returns
+    -------
+    Plan
+        The table has a further column `kind`: "improvement", "evaluation" or "check".
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument is out of range or has the wrong type.
+    ArithmeticError
+        If float64 cannot guarantee `tolerance` for this model; the message says what it can.
+
+    Notes
+    -----
+    *The bound.* A sweep V → V' with contraction factor γ leaves |V' - V*| ≤ γ / (1 - γ) |V' - V|,
+    in the largest entry. In place sweeps have the same factor, and staying solved for even a
+    smaller one, γ (1 - l) / (1 - γ l) for an action that stays with probability l. Two things are
+    added: rows of probabilities may add up to 1 + 1e-9, so the factor is γ (1 + 1e-9); and each
+    backup is off by rounding, at most 2 (K + 1) ε max(|r|, |V|), with ε = 2⁻⁵². So the bound is
+    (γ |V' - V| + rounding) / (1 - γ).
+
+    *Memory.* With 4 actions, 2 successors and probabilities shared by all states: 97 bytes a state
+    for the model and at most 90 for planning; 8 A K more if states have their own probabilities.
+
+    References
+    ----------
+    Sutton & Barto, section 4.4. Puterman, Markov Decision Processes, 6.3.3 (sweeps in place) and
+    6.5 (modified policy iteration). Dai & Goldsmith, Topological value iteration, IJCAI 2007.
+
+    Examples
+    --------
+    >>> lake = MDP.from_env("FrozenLake-v1")
+    >>> plan = value_iteration(lake, gamma=0.99, tolerance=1e-9)
+    >>> round(plan.V[0], 6), bool(plan.table["bound"].iloc[-1] <= 1e-9)
+    (np.float64(0.542026), True)
+    """
+    check_model(mdp, gamma)
+    check_positive("tolerance", tolerance)
+    transitions, reward = sweeps.arrays(mdp)
+    Q, V, policy = plan.blank(mdp)
+    order = np.arange(mdp.n_states, dtype=np.int32)
+    magnitude = sweeps.expected_rewards(transitions, reward, order, Q)  # Q is r(s, a) for now
+    bound = plan.error_bound(magnitude, gamma, plan.rounding_error(mdp, magnitude))
+    with plan.recording("value iteration", progress, "kind") as record:
+        if bound > tolerance:  # else V = 0 will do
+            ordered = sweeps.in_order(transitions, Q, mdp.terminal, gamma, order, V)
+            sweeps.expected_rewards(transitions, reward, order, Q)
+            bound = _sweep(mdp, ordered, Q, gamma, tolerance, V, policy, magnitude, record)
+            del ordered
+            V[order], policy[order] = V.copy(), policy.copy()
+        sweeps.lookahead(transitions, reward, gamma, V, Q)
+        residual, squares, changes = sweeps.greedy(Q, V, policy)
+        rounding = plan.rounding_error(mdp, max(magnitude, float(np.abs(V).max())))
+        bound = min(bound, plan.error_bound(residual, gamma, rounding))
+        record.add(residual, math.sqrt(squares), changes, Q.size, bound, "check")
+    return Plan(Q, V, policy, record.table())
+
+
+def _sweep(
+    mdp: MDP,
+    ordered: Transitions,
+    r: NDArray[np.float64],
+    gamma: float,
+    tolerance: float,
+    V: NDArray[np.float64],
+    policy: NDArray[np.signedinteger],
+    magnitude: float,
+    record: plan.Record,
+) -> float:
+    """Sweep V in place until its error bound is within the tolerance, and return the bound."""
+    chosen = ordered.successor[:, 0].copy()  # the successors of the policy, which is action 0
+    arrays = ordered, r, gamma, V, policy, chosen
+    backward, before, rounds, limit = False, math.inf, 0, math.inf
+    while True:
+        rounds += 1
+        residual, squares, changes, largest = sweeps.improvement_sweep(*arrays, backward)
+        rounding = plan.rounding_error(mdp, max(magnitude, largest))
+        bound = plan.error_bound(residual, gamma, rounding)
+        record.add(residual, math.sqrt(squares), changes, r.size, bound, "improvement")
+        if bound <= tolerance:
+            return bound
+        if residual <= rounding or rounds > limit:
+            attainable = 2 * plan.error_bound(rounding, gamma, rounding)
+            raise ArithmeticError(
+                f"tolerance {tolerance} is below what float64 can guarantee for this model and "
+                f"gamma {gamma}; ask for {attainable:.0e} or more"
+            )
+        backward, before = not backward and residual > SLOW * before, residual
+        if rounds == MODIFIED_ROUNDS:
+            error = residual / (1 - gamma)
+            limit = rounds + plan.sweeps_needed(2 * error, (1 - gamma) * tolerance / 2, gamma)
+        for _ in range(MAX_EVALUATIONS if rounds < MODIFIED_ROUNDS else 0):
+            change, squares = sweeps.evaluation_sweep(*arrays)
+            record.add(change, math.sqrt(squares), 0, len(V), math.nan, "evaluation")
+            if change <= max(ENOUGH * residual, (1 - gamma) * tolerance):
+                break
+
+
+def policy_iteration(
+    mdp: MDP,
+    *,
+    gamma: float,
+    evaluation_threshold: float | None = None,
+    initial_policy: ArrayLike | None = None,
+    progress: bool = True,
+) -> Plan:
+    """Alternate the values of a policy, V^π, and the policy that is greedy for them.
+
+    Each round evaluates π, looks one step ahead, Q(s, a) = Σ_k p_k (r_k + γ V^π(s'_k)), and moves
+    π(s) to the best action, until no action changes: then V^π solves the optimality equation. An
+    action changes only if it gains more than the error of V^π could feign (and more than a tie
+    of `greedy_policy`): so every change is an improvement, and the rounds come to an end.
+
+    Parameters
+    ----------
+    mdp : MDP
+        The model.
+    gamma : float
+        Discount, in [0, 1). With γ = 1 a policy that never ends has no finite value.
+    evaluation_threshold : float, optional
+        By default policies are evaluated exactly (`policy_evaluation`). With a threshold they are
+        evaluated by synchronous sweeps V ← Σ_k p_k (r_k + γ V(s'_k)) from the V before, until
+        no value changes by as much (θ in Sutton & Barto, section 4.3).
+    initial_policy : array of int, shape (S,), optional
+        Where to begin; by default the policy greedy for the immediate rewards.
+    progress : bool
+        Show rounds and bound on stderr once two seconds have passed.
+
+    Returns
+    -------
+    Plan
+        Q is one step ahead of V^π. A further column of the table is `evaluation_sweeps`: those of
+        the round's evaluation, 0 if it was exact.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument is out of range or has the wrong type.
+
+    Notes
+    -----
+    A linear solve is not made of backups: with exact evaluation `backups` counts the improvements
+    only. To compare the whole cost with `q_value_iteration`, give an `evaluation_threshold`:
+    then it is S backups an evaluation sweep (one action a state) and S A an improvement.
+
+    Examples
+    --------
+    >>> lake = MDP.from_env("FrozenLake-v1")
+    >>> plan = policy_iteration(lake, gamma=0.99)
+    >>> round(plan.V[0], 6), plan.table["policy_changes"].tolist()[-1]
+    (np.float64(0.542026), 0)
+    """
+    check_model(mdp, gamma)
+    if evaluation_threshold is not None:
+        check_positive("evaluation_threshold", evaluation_threshold)
+    transitions, reward = sweeps.arrays(mdp)
+    Q, V, policy = plan.blank(mdp)
+    if initial_policy is None:
+        sweeps.lookahead(transitions, reward, gamma, V, Q)
+        sweeps.greedy(Q, V, policy)
+        Q[:], V[:] = 0, 0
+    else:
+        policy[:] = plan.checked_policy("initial_policy", initial_policy, mdp)
+    states, largest = np.arange(mdp.n_states), float(np.abs(reward).max())
+    with plan.recording("policy iteration", progress, "evaluation_sweeps") as record:
+        changes = -1
+        while changes != 0:
+            if evaluation_threshold is None:
+                V, evaluations = policy_evaluation(mdp, policy, gamma=gamma), 0
+            else:
+                evaluations = _evaluate(mdp, policy, gamma, evaluation_threshold, V)
+            residual, squares = sweeps.lookahead(transitions, reward, gamma, V, Q)
+            best = Q.max(axis=1)
+            rounding = plan.rounding_error(mdp, max(largest, float(np.abs(V).max())))
+            error = (np.abs(Q[states, policy] - V).max() + rounding) / (1 - gamma)
+            gain = best - Q[states, policy]
+            better = gain > np.maximum(2 * gamma * error, TIE * np.abs(Q).max(axis=1))
+            policy = np.where(better, greedy_policy(Q), policy)
+            changes = int(better.sum())
+            bound = plan.error_bound(float(np.abs(best - V).max()), gamma, rounding)
+            backups = Q.size + evaluations * mdp.n_states
+            record.add(residual, math.sqrt(squares), changes, backups, bound, evaluations)
+    sweeps.greedy(Q, V, policy)
+    return Plan(Q, V, policy, record.table())
+
+
+def policy_evaluation(mdp: MDP, policy: ArrayLike, *, gamma: float) -> NDArray[np.float64]:
+    """Return the values of a deterministic policy, the solution of V = r_π + γ P_π V.
+
+    Up to 20,000 states the equations are solved directly (sparse LU factors). In larger models
+    `value_iteration` sweeps the model with the policy's actions only, until V is right to
+    within 1e-10 of the largest value there could be, max |r| / (1 - γ).
+
+    Parameters
+    ----------
+    mdp : MDP
+        The model.
+    policy : array of int, shape (S,)
+        The action taken in each state.
+    gamma : float
+        Discount, in [0, 1).
+
+    Returns
+    -------
+    ndarray of float64, shape (S,)
+        V^π; terminal states are worth 0.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument is out of range or has the wrong shape or type.
+
+    Examples
+    --------
+    >>> lake = MDP.from_env("FrozenLake-v1")
+    >>> always_right = np.full(16, 2)
+    >>> policy_evaluation(lake, always_right, gamma=0.99)[0].round(4)
+    np.float64(0.0288)
+    """
+    check_model(mdp, gamma)
+    followed = plan.restricted(mdp, plan.checked_policy("policy", policy, mdp))
+    if mdp.n_states > DIRECT_LIMIT:
+        largest = float(np.abs(followed.reward).max()) / (1 - gamma)
+        rounding = 4 * plan.rounding_error(mdp, largest) / (1 - gamma)
+        tolerance = max(1e-10 * largest, rounding, np.finfo(np.float64).tiny)
+        return value_iteration(followed, gamma=gamma, tolerance=tolerance, progress=False).V
+    S, _, K = followed.successor.shape
+    row_starts = np.arange(0, S * K + 1, K)
+    P = csr_matrix(
+        (followed.probability.ravel(), followed.successor.ravel(), row_starts), shape=(S, S)
+    )
+    r = (followed.probability * followed.reward).sum(axis=(1, 2))
+    V: NDArray[np.float64] = splu((identity(S) - gamma * P).tocsc()).solve(r)
+    V[mdp.terminal] = 0  # exactly
+    return V
+
+
+def backup(mdp: MDP, V: ArrayLike, *, gamma: float) -> NDArray[np.float64]:
+    """Look one step ahead of V: return Q(s, a) = Σ_k p_k (r_k + γ V(s'_k)).
+
+    Parameters
+    ----------
+    mdp : MDP
+        The model.
+    V : array of float, shape (S,)
+        State values.
+    gamma : float
+        Discount, in [0, 1).
+
+    Returns
+    -------
+    ndarray of float64, shape (S, A)
+        Action values.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument is out of range or has the wrong shape or type.
+
+    Examples
+    --------
+    >>> lake = MDP.from_env("FrozenLake-v1")
+    >>> backup(lake, np.zeros(16), gamma=0.99)[14].round(3).tolist()
+    [0.0, 0.333, 0.333, 0.333]
+    """
+    check_model(mdp, gamma)
+    values = np.array(V, dtype=np.float64)
+    if values.shape != (mdp.n_states,):
+        raise ValueError(f"V must have shape ({mdp.n_states},), not {values.shape}")
+    transitions, reward = sweeps.arrays(mdp)
+    Q = np.zeros((mdp.n_states, mdp.n_actions))
+    sweeps.lookahead(transitions, reward, gamma, values, Q)
+    return Q
+
+
+def _evaluate(
+    mdp: MDP,
+    policy: NDArray[np.signedinteger],
+    gamma: float,
+    threshold: float,
+    V: NDArray[np.float64],
+) -> int:
+    """Sweep V for one policy until no value changes by `threshold`; return how many sweeps."""
+    transitions, reward = sweeps.arrays(plan.restricted(mdp, policy))
+    Q = V[:, None].copy()
+    residual, done, limit = math.inf, 0, 1
+    while residual >= threshold and done < limit:  # at the limit only rounding is left
+        residual, _ = sweeps.lookahead(transitions, reward, gamma, V, Q)
+        V[:] = Q[:, 0]
+        done += 1
+        if done == 1:
+            limit += plan.sweeps_needed(residual, threshold, gamma)
+    return done

@@ -1,0 +1,518 @@
+"""Planning: against answers by hand, linear programs, direct solves and a plain-Python loop."""
+
+import tracemalloc
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+
+from rl_core import plan as plan_module
+from rl_core import planning
+from rl_core.maze import Maze, random_maze
+from rl_core.mdp import MDP
+from rl_core.planning import (
+    backup,
+    greedy_policy,
+    optimal_actions,
+    policy_evaluation,
+    policy_iteration,
+    q_value_iteration,
+    value_iteration,
+)
+
+PLANNERS = {
+    "q_value_iteration": lambda mdp, gamma: q_value_iteration(mdp, gamma=gamma, threshold=1e-10),
+    "value_iteration": lambda mdp, gamma: value_iteration(mdp, gamma=gamma, tolerance=1e-8),
+    "policy_iteration": lambda mdp, gamma: policy_iteration(mdp, gamma=gamma),
+    "with evaluation sweeps": lambda mdp, gamma: policy_iteration(
+        mdp, gamma=gamma, evaluation_threshold=1e-10
+    ),
+}
+each_planner = pytest.mark.parametrize("planner", PLANNERS.values(), ids=PLANNERS.keys())
+
+
+def model(successor, probability, reward, terminal=None):
+    terminal = np.zeros(len(successor), bool) if terminal is None else terminal
+    return MDP(successor, probability, reward, terminal, [0], [1.0])
+
+
+def random_model(rng, n_states=8, n_actions=3, n_successors=3, terminals=1):
+    """Dense enough that everything is connected; the last states are terminal."""
+    shape = (n_states, n_actions, n_successors)
+    successor = rng.integers(n_states, size=shape)
+    probability = rng.dirichlet(np.full(n_successors, 0.5), size=shape[:2])
+    reward = rng.normal(scale=3, size=shape) * (rng.random(shape) < 0.5)
+    terminal = np.arange(n_states) >= n_states - terminals
+    successor[terminal] = np.flatnonzero(terminal)[:, None, None]
+    reward[terminal] = 0
+    return model(successor, probability, reward, terminal)
+
+
+def matrices(mdp):
+    """P with shape (S, A, S) and r with shape (S, A)."""
+    P = np.zeros((mdp.n_states, mdp.n_actions, mdp.n_states))
+    for (s, a, k), following in np.ndenumerate(mdp.successor):
+        P[s, a, following] += mdp.probability[s, a, k]
+    return P, (mdp.probability * mdp.reward).sum(axis=2)
+
+
+def exact_values(mdp, gamma):
+    """V* by policy iteration with dense solves, until no action gains anything."""
+    P, r = matrices(mdp)
+    states = np.arange(mdp.n_states)
+    policy = np.zeros(mdp.n_states, dtype=int)
+    while True:
+        V = np.linalg.solve(np.eye(mdp.n_states) - gamma * P[states, policy], r[states, policy])
+        Q = r + gamma * P @ V
+        better = Q.max(axis=1) > Q[states, policy] + 1e-11 * (1 + np.abs(V).max())
+        if not better.any():
+            return V
+        policy = np.where(better, Q.argmax(axis=1), policy)
+
+
+def linear_program(mdp, gamma):
+    """V*: the smallest V that no action can improve."""
+    P, r = matrices(mdp)
+    A = (gamma * P - np.eye(mdp.n_states)[:, None]).reshape(-1, mdp.n_states)
+    solution = linprog(np.ones(mdp.n_states), A_ub=A, b_ub=-r.ravel(), bounds=(None, None))
+    assert solution.success
+    return solution.x
+
+
+def maze_values_by_hand(gamma=0.9, slip=0.1):
+    """V* of the course's maze from its rules alone, with sets of flags and a dictionary."""
+    rows = ["SWFWG", "OOOOO", "WOOOW", "FOWFW"]
+    letter = {(r, c): x for r, row in enumerate(rows) for c, x in enumerate(row) if x != "W"}
+    flags = {cell for cell, x in letter.items() if x == "F"}
+    subsets = [
+        frozenset(f for i, f in enumerate(sorted(flags)) if bits >> i & 1) for bits in range(8)
+    ]
+    directions = [(-1, 0), (0, 1), (1, 0), (0, -1)]  # clockwise
+
+    def enter(cell, held, direction):
+        target = (cell[0] + direction[0], cell[1] + direction[1])
+        inside = 0 <= target[0] < 4 and 0 <= target[1] < 5
+        if inside and target not in letter:
+            return cell, held
+        landed = target if inside else cell
+        return landed, held | (flags & {landed})
+
+    def worth(V, cell, held, direction):
+        landed, now_held = enter(cell, held, direction)
+        return len(now_held) if letter[landed] == "G" else gamma * V[landed, now_held]
+
+    V = {(cell, held): 0.0 for cell in letter for held in subsets}
+    for _ in range(600):
+        V = {
+            (cell, held): 0.0
+            if letter[cell] == "G"
+            else max(
+                (1 - slip) * worth(V, cell, held, d)
+                + slip * worth(V, cell, held, directions[(i + 1) % 4])
+                for i, d in enumerate(directions)
+            )
+            for cell, held in V
+        }
+    return V
+
+
+TWO_STATES = model(
+    # State 0: stay for 1, or go to state 1 for nothing. State 1: stay for 2, or go back for 5.
+    successor=[[[0], [1]], [[1], [0]]],
+    probability=np.ones((2, 2, 1)),
+    reward=[[[1.0], [0.0]], [[2.0], [5.0]]],
+)
+
+
+@each_planner
+def test_two_states_by_hand(planner):
+    # gamma 0.5: going to and fro is best: V0 = V1 / 2, V1 = 5 + V0 / 2, so V1 = 20/3, V0 = 10/3.
+    plan = planner(TWO_STATES, 0.5)
+    assert pytest.approx(np.array([[8 / 3, 10 / 3], [16 / 3, 20 / 3]]), abs=1e-8) == plan.Q
+    assert pytest.approx([10 / 3, 20 / 3], abs=1e-8) == plan.V
+    assert plan.policy.tolist() == [1, 1]
+    assert plan.policy.dtype == np.int8
+
+
+@each_planner
+def test_no_discount_at_all_is_the_reward(planner):
+    assert planner(TWO_STATES, 0.0).Q.tolist() == [[1, 0], [2, 5]]
+
+
+def test_costs_without_end():
+    mdp = model([[[0]], [[0]]], np.ones((2, 1, 1)), np.full((2, 1, 1), -1.0))
+    assert pytest.approx(-100, abs=1e-9) == value_iteration(mdp, gamma=0.99, tolerance=1e-9).V
+
+
+@pytest.mark.parametrize("limit", [planning.DIRECT_LIMIT, 0], ids=["solved", "swept"])
+@pytest.mark.parametrize("gamma", [0.0, 0.9, 0.999])
+def test_policy_evaluation_is_the_linear_solve(monkeypatch, gamma, limit):
+    monkeypatch.setattr(planning, "DIRECT_LIMIT", limit)
+    rng = np.random.default_rng(1)
+    for mdp in (random_model(rng, 30), Maze().model(), MDP.from_env("Taxi-v4")):
+        policy = rng.integers(mdp.n_actions, size=mdp.n_states)
+        P, r = matrices(mdp)
+        states = np.arange(mdp.n_states)
+        expected = np.linalg.solve(
+            np.eye(mdp.n_states) - gamma * P[states, policy], r[states, policy]
+        )
+        V = policy_evaluation(mdp, policy, gamma=gamma)
+        assert pytest.approx(expected, abs=1e-9 * (1 + np.abs(r).max()) / (1 - gamma)) == V
+        assert (V[mdp.terminal] == 0).all()
+
+
+@each_planner
+def test_maze_against_its_rules_in_plain_python(planner):
+    maze = Maze()
+    expected = maze_values_by_hand()
+    cells = {letter: maze.flag_cells[letter] for letter in "ABC"}
+    V = planner(maze.model(), 0.9).V
+    for state in range(112):
+        row, column, held = maze.locate(state)
+        by_hand = expected[(row, column), frozenset(cells[letter] for letter in held)]
+        assert V[state] == pytest.approx(by_hand, abs=1e-8)
+
+
+@each_planner
+def test_maze_norms(planner):
+    maze = Maze()
+    plan = planner(maze.model(), 0.9)
+    assert round(np.linalg.norm(plan.Q), 3) == 25.256
+    unreachable = ~maze.reachable_states() & ~maze.model().terminal
+    assert unreachable.sum() == 12
+    assert round(np.linalg.norm(plan.Q[unreachable]), 3) == 7.957
+    assert (plan.Q[maze.model().terminal] == 0).all()
+
+
+@each_planner
+def test_frozen_lake(planner):
+    lake = MDP.from_env("FrozenLake-v1")
+    plan = planner(lake, 0.99)
+    assert round(plan.V[0], 4) == 0.5420
+    assert pytest.approx(linear_program(lake, 0.99), abs=1e-7) == plan.V
+
+
+def test_maze_against_a_linear_program():
+    mdp = Maze().model()
+    V = value_iteration(mdp, gamma=0.9, tolerance=1e-9).V
+    assert pytest.approx(linear_program(mdp, 0.9), abs=1e-7) == V
+
+
+@pytest.mark.parametrize(
+    "name", ["rl_core/Maze-v0", "FrozenLake-v1", "FrozenLake8x8-v1", "CliffWalking-v1", "Taxi-v4"]
+)
+def test_planners_agree(name):
+    with gym.make(name) as env:
+        mdp = MDP.from_env(env)
+    plans = [planner(mdp, 0.95) for planner in PLANNERS.values()]
+    exact = exact_values(mdp, 0.95)
+    best = optimal_actions(backup(mdp, exact, gamma=0.95), tolerance=1e-6)
+    for plan in plans:
+        assert pytest.approx(exact, abs=1e-7) == plan.V
+        assert plan.V.tolist() == plan.Q.max(axis=1).tolist()
+        assert best[np.arange(mdp.n_states), plan.policy].all()
+        assert (optimal_actions(plan.Q, tolerance=1e-6) == best).all()
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    gamma=st.sampled_from([0.0, 0.3, 0.9, 0.99, 0.999]),
+    tolerance=st.sampled_from([1.0, 1e-3, 1e-6, 1e-7]),
+    terminals=st.integers(0, 2),
+)
+def test_value_iteration_keeps_its_tolerance(seed, gamma, tolerance, terminals):
+    mdp = random_model(np.random.default_rng(seed), terminals=terminals)
+    V = exact_values(mdp, gamma)
+    plan = value_iteration(mdp, gamma=gamma, tolerance=tolerance)
+    bound = plan.table["bound"].iloc[-1]
+    exact_to = 1e-10  # of the solve above
+    assert bound <= tolerance
+    assert np.abs(plan.V - V).max() <= bound + exact_to
+    assert np.abs(plan.Q - backup(mdp, V, gamma=gamma)).max() <= bound + exact_to
+    assert (plan.Q[mdp.terminal] == 0).all()
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), gamma=st.sampled_from([0.0, 0.5, 0.9, 0.99]))
+def test_every_bound_holds(seed, gamma):
+    mdp = random_model(np.random.default_rng(seed))
+    Q = backup(mdp, exact_values(mdp, gamma), gamma=gamma)
+    for n_sweeps in (1, 2, 5, 30):
+        plan = q_value_iteration(mdp, gamma=gamma, max_sweeps=n_sweeps)
+        assert np.abs(plan.Q - Q).max() <= plan.table["bound"].iloc[-1] + 1e-10
+    for planner in PLANNERS.values():
+        plan = planner(mdp, gamma)
+        assert np.abs(plan.Q - Q).max() <= plan.table["bound"].iloc[-1] + 1e-10
+
+
+@pytest.mark.parametrize("rounds", [1, 3])
+def test_tolerance_holds_without_evaluation_sweeps(monkeypatch, rounds):
+    monkeypatch.setattr(planning, "MODIFIED_ROUNDS", rounds)
+    mdp = random_maze(20, 20, 2, 0.0, np.random.default_rng(4)).model()
+    plan = value_iteration(mdp, gamma=0.99)
+    assert np.abs(plan.V - policy_iteration(mdp, gamma=0.99).V).max() <= 1e-6
+    kinds = plan.table["kind"]
+    assert (kinds.iloc[rounds * (planning.MAX_EVALUATIONS + 1) :] != "evaluation").all()
+
+
+def test_random_mazes_against_synchronous_sweeps():
+    for seed, wall_fraction in enumerate([0.0, 0.2, 0.35]):
+        rng = np.random.default_rng(seed)
+        mdp = random_maze(30, 40, 3, wall_fraction, rng, slip=0.3).model()
+        plain = q_value_iteration(mdp, gamma=0.95, threshold=1e-10)
+        assert np.abs(value_iteration(mdp, gamma=0.95).Q - plain.Q).max() <= 1e-6
+
+
+def test_q_value_iteration_sweep_by_sweep():
+    mdp = Maze().model()
+    plan = q_value_iteration(mdp, gamma=0.9, threshold=1e-5)
+    Q, policy, rows = np.zeros((112, 4)), np.zeros(112, int), []
+    while not rows or rows[-1][2] >= 1e-5:
+        updated = (mdp.probability * (mdp.reward + 0.9 * Q.max(axis=1)[mdp.successor])).sum(axis=2)
+        changed = greedy_policy(updated)
+        rows.append(
+            (
+                len(rows) + 1,
+                np.abs(updated - Q).max(),
+                np.linalg.norm(updated - Q),
+                (changed != policy).sum(),
+                448 * (len(rows) + 1),
+            )
+        )
+        Q, policy = updated, changed
+    assert pytest.approx(Q, abs=1e-12) == plan.Q
+    assert plan.policy.tolist() == policy.tolist()
+    columns = ["sweep", "residual", "norm", "policy_changes", "backups"]
+    assert list(plan.table.columns) == [*columns, "bound"]
+    assert plan.table[columns].to_numpy() == pytest.approx(np.array(rows), rel=1e-9, abs=1e-12)
+    assert plan.table["norm"].iloc[-1] < 1e-5 <= plan.table["norm"].iloc[-2]
+
+
+def test_residuals_contract():
+    for mdp, gamma in ((Maze().model(), 0.9), (random_model(np.random.default_rng(3), 20), 0.99)):
+        residual = q_value_iteration(mdp, gamma=gamma, threshold=1e-8).table["residual"].to_numpy()
+        rounding = 1e-15 * residual[0] / (1 - gamma)
+        assert (residual[1:] <= gamma * residual[:-1] + rounding).all()
+        bound = gamma ** np.arange(len(residual)) * residual[0]
+        assert (residual <= bound + rounding / (1 - gamma)).all()
+
+
+def test_max_sweeps_stops_early():
+    plan = q_value_iteration(Maze().model(), gamma=0.9, max_sweeps=3)
+    assert len(plan.table) == 3
+    assert plan.table["norm"].iloc[-1] > 1e-5
+
+
+def test_table_of_value_iteration():
+    mdp = random_maze(12, 12, 2, 0.2, np.random.default_rng(0)).model()
+    table = value_iteration(mdp, gamma=0.99, tolerance=1e-7).table
+    columns = ["sweep", "residual", "norm", "policy_changes", "backups", "bound", "kind"]
+    assert list(table.columns) == columns
+    assert table["sweep"].tolist() == list(range(1, len(table) + 1))
+    cost = table["kind"].map({"evaluation": mdp.n_states}).fillna(4 * mdp.n_states)
+    assert table["backups"].tolist() == cost.cumsum().tolist()
+    assert table["kind"].iloc[[0, -1]].tolist() == ["improvement", "check"]
+    improvement = table[table["kind"] == "improvement"]
+    assert (improvement["bound"].iloc[:-1] > 1e-7).all()
+    assert improvement["bound"].iloc[-1] <= 1e-7
+    assert table["bound"].isna().tolist() == (table["kind"] == "evaluation").tolist()
+    assert (table["norm"] >= table["residual"]).all()
+
+
+def test_table_of_policy_iteration():
+    mdp = Maze().model()
+    exact = policy_iteration(mdp, gamma=0.9).table
+    swept = policy_iteration(mdp, gamma=0.9, evaluation_threshold=1e-6).table
+    assert exact["policy_changes"].tolist() == swept["policy_changes"].tolist()
+    assert exact["policy_changes"].iloc[-1] == 0
+    assert (exact["policy_changes"].iloc[:-1] > 0).all()
+    assert exact["backups"].tolist() == [448 * sweep for sweep in exact["sweep"]]
+    assert (exact["evaluation_sweeps"] == 0).all()
+    cost = 448 + 112 * swept["evaluation_sweeps"]
+    assert swept["backups"].tolist() == cost.cumsum().tolist()
+    assert exact["bound"].iloc[-1] < 1e-10
+
+
+def test_policy_iteration_from_the_optimum_takes_one_round():
+    mdp = MDP.from_env("Taxi-v4")
+    policy = value_iteration(mdp, gamma=0.9, tolerance=1e-9).policy
+    assert len(policy_iteration(mdp, gamma=0.9, initial_policy=policy).table) == 1
+
+
+def test_policy_iteration_improves_every_round():
+    mdp = random_model(np.random.default_rng(9), 40)
+    policy, values = np.zeros(40, int), []
+    for _ in range(20):
+        values.append(policy_evaluation(mdp, policy, gamma=0.95))
+        policy = greedy_policy(backup(mdp, values[-1], gamma=0.95))
+    assert (np.diff(values, axis=0) >= -1e-9).all()
+    rounds = policy_iteration(mdp, gamma=0.95, initial_policy=np.zeros(40, int)).table
+    assert len(rounds) < 20
+    assert pytest.approx(policy_iteration(mdp, gamma=0.95).V) == values[-1]
+
+
+def test_policy_iteration_sweeps_large_models(monkeypatch):
+    monkeypatch.setattr(planning, "DIRECT_LIMIT", 100)
+    plan = policy_iteration(Maze().model(), gamma=0.9)
+    assert round(np.linalg.norm(plan.Q), 3) == 25.256
+    assert plan.table["bound"].iloc[-1] < 1e-7
+
+
+@settings(max_examples=10, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_numbering_of_states_does_not_matter(seed):
+    mdp = random_maze(9, 9, 2, 0.2, np.random.default_rng(5)).model()
+    order = np.random.default_rng(seed).permutation(mdp.n_states)
+    rank = np.argsort(order)
+    shuffled = model(
+        rank[mdp.successor[order]],
+        mdp.probability[order],
+        mdp.reward[order],
+        mdp.terminal[order],
+    )
+    V = value_iteration(mdp, gamma=0.99, tolerance=1e-9).V
+    again = value_iteration(shuffled, gamma=0.99, tolerance=1e-9).V
+    assert np.abs(again - V[order]).max() <= 2e-9
+
+
+def test_same_bits_whether_probabilities_are_shared_or_not():
+    mdp = random_maze(15, 15, 3, 0.2, np.random.default_rng(2)).model()
+    assert mdp.probability.strides[0] == 0
+    own = model(mdp.successor, mdp.probability.copy(), mdp.reward, mdp.terminal)
+    for plan_of in (
+        lambda mdp: value_iteration(mdp, gamma=0.99),
+        lambda mdp: q_value_iteration(mdp, gamma=0.9),
+    ):
+        one, other, again = plan_of(mdp), plan_of(own), plan_of(mdp)
+        assert one.Q.tobytes() == other.Q.tobytes() == again.Q.tobytes()
+        assert one.policy.tobytes() == other.policy.tobytes() == again.policy.tobytes()
+        assert one.table.equals(again.table)
+
+
+def test_many_actions():
+    n_actions = 200  # more than an int8 holds
+    reward = np.zeros((2, n_actions, 1))
+    reward[0, 150] = 1
+    mdp = model(np.ones((2, n_actions, 1), int), np.ones((2, n_actions, 1)), reward, [False, True])
+    for planner in PLANNERS.values():
+        assert planner(mdp, 0.9).policy.tolist() == [150, 0]
+
+
+def test_nothing_to_gain():
+    mdp = random_maze(10, 10, 0, 0.2, np.random.default_rng(0)).model()
+    plan = value_iteration(mdp, gamma=0.99)
+    assert not plan.Q.any()
+    assert plan.table["kind"].tolist() == ["check"]
+
+
+def test_memory_within_200_bytes_a_state():
+    mdp = random_maze(100, 100, 3, 0.2, np.random.default_rng(0)).model()
+    value_iteration(mdp, gamma=0.99)  # compile
+    tracemalloc.start()
+    try:
+        value_iteration(mdp, gamma=0.99)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert (mdp.nbytes + peak) / mdp.n_states <= 200
+
+
+def test_greedy_policy_and_optimal_actions():
+    Q = np.array([[1.0, 1.0 + 1e-13, 0.0], [-1e6, -1e6 + 1e-7, -2e6], [0, 0, 0], [0.5, 1, 1.1]])
+    assert greedy_policy(Q).tolist() == [0, 0, 0, 2]
+    expected = [[1, 1, 0], [1, 1, 0], [1, 1, 1], [0, 0, 1]]
+    assert optimal_actions(Q).astype(int).tolist() == expected
+    assert optimal_actions(Q, tolerance=0).astype(int).tolist() == expected
+    assert optimal_actions(Q, tolerance=0.1 + 1e-12)[3].tolist() == [False, True, True]
+    assert greedy_policy(np.array([[1e-9, 2e-9]])).tolist() == [1]  # small is not equal
+    rng = np.random.default_rng(0)
+    Q = rng.integers(1, 4, size=(50, 4)) + rng.normal(scale=1e-13, size=(50, 4))
+    assert greedy_policy(Q).tolist() == optimal_actions(Q).argmax(axis=1).tolist()
+
+
+def test_progress_is_shown_after_a_while_and_can_be_switched_off(monkeypatch, capsys):
+    mdp = Maze().model()
+    q_value_iteration(mdp, gamma=0.9)
+    assert capsys.readouterr().err == ""  # too quick to be shown
+    monkeypatch.setattr(plan_module, "PATIENCE", 1e-9)
+    for planner in (q_value_iteration, value_iteration, policy_iteration):
+        planner(mdp, gamma=0.9, progress=False)
+        assert capsys.readouterr().err == ""
+        planner(mdp, gamma=0.9)
+        assert "error at most" in capsys.readouterr().err
+
+
+def test_what_float64_cannot_do_is_refused():
+    mdp = Maze().model()
+    with pytest.raises(ArithmeticError, match=r"tolerance 1e-16 is below .* ask for"):
+        value_iteration(mdp, gamma=0.9, tolerance=1e-16)
+    # Three states in a ring, whose last bits go round for ever.
+    reward = np.random.default_rng(3).normal(size=(3, 1, 1))
+    ring = model([[[1]], [[2]], [[0]]], np.ones((3, 1, 1)), reward)
+    with pytest.raises(ArithmeticError, match="threshold 1e-18 is below"):
+        q_value_iteration(ring, gamma=0.9, threshold=1e-18)
+    assert (
+        pytest.approx(exact_values(ring, 0.9))
+        == policy_iteration(ring, gamma=0.9, evaluation_threshold=1e-18).V
+    )
+
+
+def test_the_tolerance_an_error_names_can_be_had():
+    mdp = random_model(np.random.default_rng(0), 20, terminals=0)
+    with pytest.raises(ArithmeticError) as caught:
+        value_iteration(mdp, gamma=0.999, tolerance=1e-15)
+    attainable = float(str(caught.value).split("ask for ")[1].split(" ")[0])
+    assert attainable < 1e-7
+    V = value_iteration(mdp, gamma=0.999, tolerance=attainable).V
+    assert np.abs(V - exact_values(mdp, 0.999)).max() < attainable + 1e-9
+
+
+@pytest.mark.parametrize("planner", [q_value_iteration, value_iteration, policy_iteration])
+@pytest.mark.parametrize("gamma", [1, 1.0, -0.1, 1.5, float("nan"), float("inf")])
+def test_gamma_out_of_range(planner, gamma):
+    with pytest.raises(ValueError, match=r"gamma must lie in \[0, 1\)"):
+        planner(Maze().model(), gamma=gamma)
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (lambda m: value_iteration(Maze(), gamma=0.9), TypeError, "mdp must be an MDP .* not Maze"),
+        (lambda m: value_iteration(m, gamma="0.9"), TypeError, "gamma must be a number, not str"),
+        (lambda m: value_iteration(m, gamma=True), TypeError, "gamma must be a number, not bool"),
+        (lambda m: value_iteration(m, gamma=0.9, tolerance=0), ValueError, "tolerance must be pos"),
+        (lambda m: value_iteration(m, gamma=0.9, tolerance=np.inf), ValueError, "tolerance .* inf"),
+        (lambda m: value_iteration(m, gamma=0.9, tolerance=None), TypeError, "tolerance must be a"),
+        (lambda m: q_value_iteration(m, gamma=0.9, threshold=-1), ValueError, "threshold .* -1"),
+        (lambda m: q_value_iteration(m, gamma=0.9, max_sweeps=0), ValueError, "max_sweeps .* 0"),
+        (lambda m: q_value_iteration(m, gamma=0.9, max_sweeps=2.5), TypeError, "max_sweeps must"),
+        (
+            lambda m: policy_iteration(m, gamma=0.9, evaluation_threshold=0),
+            ValueError,
+            "evaluation_threshold must be positive",
+        ),
+        (
+            lambda m: policy_iteration(m, gamma=0.9, initial_policy=[0, 1]),
+            ValueError,
+            r"initial_policy must have shape \(112,\), not \(2,\)",
+        ),
+        (
+            lambda m: policy_evaluation(m, np.full(112, 4), gamma=0.9),
+            ValueError,
+            "policy must lie in 0..3, in state 0 it is 4",
+        ),
+        (lambda m: policy_evaluation(m, np.full(112, -1), gamma=0.9), ValueError, "it is -1"),
+        (lambda m: policy_evaluation(m, np.zeros(112), gamma=0.9), TypeError, "policy must hold"),
+        (lambda m: backup(m, np.zeros(3), gamma=0.9), ValueError, r"V must have shape \(112,\)"),
+        (lambda m: greedy_policy([1.0, 2.0]), ValueError, "Q must have shape"),
+        (lambda m: greedy_policy([[1.0], [np.nan]]), ValueError, "Q must be finite, in state 1"),
+        (lambda m: optimal_actions([[1.0]], tolerance=-1), ValueError, "tolerance must be pos"),
+    ],
+)
+def test_wrong_arguments(call, error, message):
+    with pytest.raises(error, match=message):
+        call(Maze().model())
