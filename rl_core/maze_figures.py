@@ -53,7 +53,7 @@ def situation_figure(
     --------
     >>> maze = Maze()
     >>> figure = situation_figure(maze, np.zeros((112, 4)), "AB")
-    >>> figure.axes[0].get_title()
+    >>> figure.axes[0].get_title(loc="left")
     'Situation 5: flags A and B held'
     """
     rows, columns = maze.walls.shape
@@ -86,7 +86,7 @@ def situation_figure(
         for action in np.flatnonzero(best[state]):
             _arrow(axes, row, column, int(action))
     number = maze.flag_sets.index(flags) + 1
-    axes.set_title(f"Situation {number}: {_held(flags)}", fontsize=12)
+    axes.set_title(f"Situation {number}: {_held(flags)}", loc="left", fontsize=12)
     plt.close(figure)
     return figure
 

@@ -51,8 +51,8 @@ SLOW = 0.5
 one: it carries values through where the estimated order is the wrong way round."""
 
 MODIFIED_ROUNDS = 200
-"""After so many rounds the evaluation sweeps are left out: with them the sweeps converge faster in
-practice, without them each is a contraction, whatever the values."""
+"""After so many rounds the evaluation sweeps, there for speed, are left out: improvement sweeps
+alone contract from any values, so that convergence is certain."""
 
 
 def q_value_iteration(
@@ -91,7 +91,7 @@ def q_value_iteration(
     ValueError, TypeError
         If an argument is out of range or has the wrong type.
     ArithmeticError
-        If `threshold` is less than rounding lets the changes become.
+        If rounding keeps the changes above `threshold`.
 
     Notes
     -----
@@ -116,15 +116,14 @@ def q_value_iteration(
             residual, squares = sweeps.lookahead(transitions, reward, gamma, V, Q)
             _, _, changes = sweeps.greedy(Q, V, policy)
             norm = math.sqrt(squares)
-            rounding = plan.rounding_error(mdp, max(largest, float(np.abs(V).max())))
-            record.add(residual, norm, changes, Q.size, plan.error_bound(residual, gamma, rounding))
+            magnitude = max(largest, float(np.abs(V).max()) + residual)
+            bound = plan.error_bound(residual, gamma, plan.rounding_error(mdp, magnitude))
+            record.add(residual, norm, changes, Q.size, bound)
             if len(record.rows) == 1 and max_sweeps is None:
                 limit = 1 + plan.sweeps_needed(norm * math.sqrt(Q.size), threshold, gamma)
     if norm >= threshold and max_sweeps is None:
-        raise ArithmeticError(
-            f"threshold {threshold} is below what rounding allows: after {len(record.rows)} sweeps "
-            f"the norm of the change is {norm:.1e}"
-        )
+        found = f"after {len(record.rows)} sweeps the norm of the change is {norm:.1e}"
+        raise ArithmeticError(f"threshold {threshold} is below what rounding allows: {found}")
     return Plan(Q, V, policy, record.table())
 
 
@@ -138,8 +137,8 @@ def value_iteration(
     - *Order.* States are swept by falling value, as estimated beforehand by a search
       backwards from the rewards; a sweep works in place and so carries values all the way.
     - *No waiting.* The chance to stay in the same state is solved for instead of swept for.
-    - *Evaluation sweeps.* An improvement sweep, over all actions, is followed by up to eight
-      that follow its greedy actions only (modified policy iteration).
+    - *Evaluation sweeps.* Up to eight sweeps that follow the greedy actions only come after each
+      improvement sweep, over all actions (modified policy iteration).
 
     A last synchronous sweep writes Q and V = max_a Q: the table's row of kind "check".
 
@@ -206,7 +205,8 @@ def value_iteration(
             V[order], policy[order] = V.copy(), policy.copy()
         sweeps.lookahead(transitions, reward, gamma, V, Q)
         residual, squares, changes = sweeps.greedy(Q, V, policy)
-        rounding = plan.rounding_error(mdp, max(magnitude, float(np.abs(V).max())))
+        magnitude = max(magnitude, float(np.abs(V).max()) + residual)
+        rounding = plan.rounding_error(mdp, magnitude)
         bound = min(bound, plan.error_bound(residual, gamma, rounding))
         record.add(residual, math.sqrt(squares), changes, Q.size, bound, "check")
     return Plan(Q, V, policy, record.table())
@@ -230,7 +230,7 @@ def _sweep(
     while True:
         rounds += 1
         residual, squares, changes, largest = sweeps.improvement_sweep(*arrays, backward)
-        rounding = plan.rounding_error(mdp, max(magnitude, largest))
+        rounding = plan.rounding_error(mdp, max(magnitude, largest + residual))
         bound = plan.error_bound(residual, gamma, rounding)
         record.add(residual, math.sqrt(squares), changes, r.size, bound, "improvement")
         if bound <= tolerance:

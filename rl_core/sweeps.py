@@ -148,9 +148,9 @@ def _main_slot(probability: NDArray[np.float64], row: int, a: int) -> int:
 
 @compiled
 def count_predecessors(transitions: Transitions, first: NDArray[np.int64]) -> None:
-    """Write where each state's entries of `link_predecessors` begin: those of s at first[s + 1].
+    """Write where each state's list of predecessors will begin: that of s at first[s + 1].
 
-    Linking moves every beginning up by the entries written: then those of s begin at first[s].
+    Filling the list moves first[s + 1] to its end, so that afterwards it is first[s]..first[s + 1].
     """
     successor, probability, own_rows = transitions
     n_states, n_actions, _ = successor.shape
@@ -171,7 +171,7 @@ def link_predecessors(
     predecessor: NDArray[np.int32],
     action: NDArray[np.signedinteger],
 ) -> None:
-    """List, for every state, the other states and actions whose likeliest successor it is."""
+    """Fill the lists: for every state, the other states and actions that most likely lead to it."""
     successor, probability, own_rows = transitions
     n_states, n_actions, _ = successor.shape
     for s in range(n_states):
@@ -313,6 +313,7 @@ def in_order(
         transitions.own_rows,
     )
     rearrange(transitions, order, scratch, ordered)
+    del scratch
     V[:] = V[order]
     return ordered
 
