@@ -1,0 +1,449 @@
+"""Statistics over seeds: intervals, success fractions, convergence.
+
+A seed is one independent run of an arm, and the only thing that is resampled here. Measures are
+counts of steps or episodes, so lower is better throughout; negate returns. A seed that never gets
+there counts as infinity rather than being dropped: medians, interquartile means and the probability
+of improvement take infinities as they are.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+
+from rl_core.compiled import compiled
+
+Statistic = Callable[..., Any]
+POINTS_AT_ONCE = 64  # bounds the memory of a bootstrap to 5 MB for 10,000 resamples
+
+
+class Interval(NamedTuple):
+    """An estimate between its confidence limits.
+
+    Attributes
+    ----------
+    estimate, low, high : float or numpy.ndarray
+        Numbers, or arrays of shape (points,).
+    """
+
+    estimate: Any
+    low: Any
+    high: Any
+
+
+def iqm(values: ArrayLike, axis: int = 0) -> Any:
+    """Return the interquartile mean along `axis`: the mean of the middle half.
+
+    Of n values, floor(n / 4) are left out at either end (Agarwal et al. 2021, "Deep reinforcement
+    learning at the edge of the statistical precipice"). NaN among the values gives NaN.
+
+    >>> float(iqm([100.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, -7.0]))
+    3.5
+    """
+    values = np.asarray(values, dtype=np.float64)
+    middle = stats.trim_mean(values, 0.25, axis=axis)
+    return np.where(np.isnan(values).any(axis=axis), np.nan, middle)
+
+
+def bootstrap_interval(
+    values: ArrayLike,
+    statistic: Statistic = np.median,
+    *,
+    rng: np.random.Generator,
+    level: float = 0.95,
+    resamples: int = 10_000,
+) -> Interval:
+    """Return a statistic over seeds with its percentile bootstrap interval.
+
+    The seeds are drawn with replacement, as many as there are, `resamples` times; the limits are
+    the (1 - level) / 2 and (1 + level) / 2 quantiles of the statistic over the draws, rounded
+    outwards to a value that occurred (Efron and Tibshirani 1993, "An introduction to the
+    bootstrap", chapter 13). A curve's points see the same draws. Mean, interquartile mean and
+    median of the ordered values x_(1) <= ... <= x_(n) are one formula with different trim g:
+
+        T = 1 / (n - 2 g) sum_{k = g + 1}^{n - g} x_(k),   g = 0, floor(n / 4), floor((n - 1) / 2)
+
+    Parameters
+    ----------
+    values : array, shape (seeds,) or (seeds, points)
+        At least one seed. Infinities are values like others. A point that has a NaN gets NaN
+        throughout: no seed is left out silently.
+    statistic : {np.median, np.mean, iqm}
+        What is estimated.
+    rng : numpy.random.Generator
+        Draws the seeds.
+    level : float
+        Confidence, between 0 and 1.
+    resamples : int
+        Number of draws, at least 1.
+
+    Returns
+    -------
+    Interval
+        Floats, or arrays of shape (points,).
+
+    Raises
+    ------
+    TypeError, ValueError
+        An argument is not as described.
+
+    Examples
+    --------
+    >>> estimate, low, high = bootstrap_interval(
+    ...     [93.0, 101.0, 88.0, 120.0, 97.0], rng=np.random.default_rng(0)
+    ... )
+    >>> estimate, low, high
+    (97.0, 88.0, 120.0)
+    """
+    values = _checked_values("values", values)
+    _check_draws(rng, level, resamples)
+    n_seeds = len(values)
+    points = values.reshape(n_seeds, -1).T.copy()
+    trim = _trim(statistic, n_seeds)
+    counts = _seed_counts(n_seeds, resamples, rng)
+    low, high = np.empty(len(points)), np.empty(len(points))
+    for start in range(0, len(points), POINTS_AT_ONCE):
+        part = slice(start, start + POINTS_AT_ONCE)
+        order = np.argsort(points[part], axis=1)
+        ordered = np.take_along_axis(points[part], order, axis=1)
+        low[part], high[part] = _limits(_trimmed_means(ordered, order, counts, trim), level)
+    unknown = np.isnan(points).any(axis=1)
+    low[unknown] = high[unknown] = np.nan
+    estimate = np.where(unknown, np.nan, statistic(points, axis=1))
+    if values.ndim == 1:
+        return Interval(float(estimate[0]), float(low[0]), float(high[0]))
+    return Interval(estimate, low, high)
+
+
+def paired_difference_interval(
+    a: ArrayLike,
+    b: ArrayLike,
+    statistic: Statistic = np.median,
+    *,
+    rng: np.random.Generator,
+    level: float = 0.95,
+    resamples: int = 10_000,
+) -> Interval:
+    """Return the bootstrap interval of a statistic of a - b, seed by seed.
+
+    Parameters
+    ----------
+    a, b : array, shape (seeds,) or (seeds, points)
+        Two arms with the same seeds in the same order. Finite or NaN: where seeds never get
+        there, `probability_of_improvement` still compares.
+    statistic, rng, level, resamples
+        As in `bootstrap_interval`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        An argument is not as described.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> paired_difference_interval([5.0, 7.0, 9.0], [4.0, 5.0, 6.0], np.mean, rng=rng).estimate
+    2.0
+    """
+    a, b = _checked_values("a", a), _checked_values("b", b)
+    if a.shape != b.shape:
+        raise ValueError(f"a has shape {a.shape}, b has {b.shape}; allowed are equal shapes")
+    if np.isinf(a).any() or np.isinf(b).any():
+        raise ValueError("a or b is infinite for some seed; allowed are finite values and NaN")
+    return bootstrap_interval(a - b, statistic, rng=rng, level=level, resamples=resamples)
+
+
+def probability_of_improvement(
+    a: ArrayLike,
+    b: ArrayLike,
+    *,
+    rng: np.random.Generator,
+    level: float = 0.95,
+    resamples: int = 10_000,
+) -> Interval:
+    """Return how likely a random seed of arm `a` does better (lower) than one of arm `b`.
+
+        P = 1 / (n m) sum_i sum_j ([a_i < b_j] + [a_i = b_j] / 2)
+
+    with a percentile bootstrap interval that draws the seeds of each arm independently (Agarwal et
+    al. 2021, section 4.3). Half means that neither is better.
+
+    Parameters
+    ----------
+    a, b : array, shape (seeds,)
+        The arms; infinities are allowed, NaN is not.
+    rng, level, resamples
+        As in `bootstrap_interval`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        An argument is not as described.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> probability_of_improvement([1.0, 2.0], [2.0, np.inf], rng=rng).estimate
+    0.875
+    """
+    a, b = _checked_values("a", a), _checked_values("b", b)
+    _check_draws(rng, level, resamples)
+    for name, values in (("a", a), ("b", b)):
+        if values.ndim != 1 or np.isnan(values).any():
+            raise ValueError(f"{name} has shape {values.shape}; allowed is (seeds,) without NaN")
+    better = (a[:, None] < b) + (a[:, None] == b) / 2
+    drawn_a = _seed_counts(len(a), resamples, rng) / len(a)
+    drawn_b = _seed_counts(len(b), resamples, rng) / len(b)
+    low, high = _limits(np.sum((drawn_a @ better) * drawn_b, axis=1), level)
+    return Interval(float(better.mean()), float(low), float(high))
+
+
+def proportion_interval(successes: int, trials: int, *, level: float = 0.95) -> Interval:
+    """Return the fraction `successes / trials` with its Wilson score interval.
+
+    The limits are the p at which a test of p with normal approximation just does not reject (Wilson
+    1927); they stay within [0, 1], and are sensible for fractions of 0 and 1 too.
+
+    Raises
+    ------
+    ValueError
+        Not 0 <= successes <= trials, no trials, or `level` not between 0 and 1.
+
+    Examples
+    --------
+    >>> estimate, low, high = proportion_interval(27, 30)
+    >>> f"{estimate:.2f} [{low:.2f}, {high:.2f}]"
+    '0.90 [0.74, 0.97]'
+    """
+    _check_level(level)
+    if not 0 <= successes <= trials or trials == 0:
+        raise ValueError(
+            f"successes is {successes}, trials {trials}; allowed are 0 <= successes <= trials, "
+            "1 <= trials"
+        )
+    limits = stats.binomtest(successes, trials).proportion_ci(level, method="wilson")
+    return Interval(successes / trials, float(limits.low), float(limits.high))
+
+
+def learning_curves(
+    table: pd.DataFrame,
+    column: str = "steps",
+    *,
+    seeds: Sequence[int],
+    episodes: int,
+    window: int = 1,
+    average: Literal["median", "mean"] = "median",
+) -> NDArray[np.float64]:
+    """Return a column of one arm's table as one curve a seed, smoothed over the last episodes.
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        With the columns `seed`, `episode` (from 1) and `column`; one row a seed and episode.
+    column : str
+        What is drawn.
+    seeds : sequence of int
+        The rows of the result: all seeds that were run, so that none that failed goes missing.
+    episodes : int
+        The length of the result.
+    window : int
+        The trailing window, at least 1: point t is the average over episodes t - window + 1 to t,
+        fewer at the start.
+    average : {"median", "mean"}
+        The average.
+
+    Returns
+    -------
+    numpy.ndarray, shape (seeds, episodes), float64
+        NaN where a seed has no such episode: after it stopped.
+
+    Raises
+    ------
+    ValueError
+        The table has several rows for a seed and episode (several arms), no such column, or other
+        seeds or episodes than those asked for.
+
+    Examples
+    --------
+    >>> table = pd.DataFrame({"seed": [0, 0, 1], "episode": [1, 2, 1], "steps": [90, 70, 80]})
+    >>> learning_curves(table, seeds=[0, 1, 2], episodes=2, window=2)
+    array([[90., 80.],
+           [80., nan],
+           [nan, nan]])
+    """
+    if column not in table:
+        raise ValueError(f"column is {column!r}; allowed are {list(table.columns)}")
+    if window < 1 or average not in ("median", "mean"):
+        raise ValueError(
+            f"window is {window}, average {average!r}; allowed are from 1, and 'median' or 'mean'"
+        )
+    if table.duplicated(["seed", "episode"]).any():
+        raise ValueError("table has several rows for a seed and episode; allowed is a single arm")
+    wide = table.pivot(index="episode", columns="seed", values=column)
+    others = sorted(set(wide.columns) - set(seeds))
+    if others or not wide.index.isin(range(1, episodes + 1)).all():
+        raise ValueError(
+            f"table has seeds {others} besides those asked for, and the episodes "
+            f"{wide.index.min()} to {wide.index.max()}; allowed are episodes 1 to {episodes}"
+        )
+    wide = wide.astype(np.float64).reindex(index=range(1, episodes + 1), columns=list(seeds))
+    trailing = wide.rolling(window, min_periods=1)
+    smooth = trailing.median() if average == "median" else trailing.mean()
+    return smooth.where(wide.notna()).to_numpy().T.copy()
+
+
+def learned(curves: ArrayLike, threshold: float, *, window: int) -> NDArray[np.bool_]:
+    """Return which seeds learn: the median over the last `window` episodes is at most `threshold`.
+
+    Parameters
+    ----------
+    curves : array, shape (seeds, episodes)
+        Not smoothed. To judge at a milestone, pass the curves up to there.
+    threshold : float
+        In the units of the curves.
+    window : int
+        1 to the number of episodes.
+
+    Returns
+    -------
+    numpy.ndarray, shape (seeds,), bool
+        False where the window has a NaN: a seed that stopped has not learned.
+
+    Raises
+    ------
+    ValueError
+        `curves` has another shape, or `window` does not fit into it.
+
+    Examples
+    --------
+    >>> curves = [[500.0, 90.0, 95.0], [500.0, 500.0, 90.0], [90.0, 90.0, np.nan]]
+    >>> learned(curves, 100, window=2)
+    array([ True, False, False])
+    """
+    curves = _checked_curves(curves, "window", window)
+    return np.asarray(np.median(curves[:, -window:], axis=1) <= threshold)
+
+
+def episodes_to_threshold(
+    curves: ArrayLike, threshold: float, *, hold: int = 1
+) -> NDArray[np.float64]:
+    """Return the episode from which each seed stays at or below `threshold` for `hold` episodes.
+
+    Parameters
+    ----------
+    curves : array, shape (seeds, episodes)
+        Usually smoothed.
+    threshold : float
+        In the units of the curves.
+    hold : int
+        Episodes in a row, 1 to their number.
+
+    Returns
+    -------
+    numpy.ndarray, shape (seeds,), float64
+        Episodes counted from 1; infinity for seeds that never do (censored: they might, later).
+
+    Raises
+    ------
+    ValueError
+        `curves` has another shape, or `hold` does not fit into it.
+
+    Examples
+    --------
+    >>> episodes_to_threshold([[9.0, 3.0, 9.0, 2.0, 1.0], [9.0, 9.0, 9.0, 9.0, 3.0]], 3, hold=2)
+    array([ 4., inf])
+    """
+    curves = _checked_curves(curves, "hold", hold)
+    windows = np.lib.stride_tricks.sliding_window_view(curves <= threshold, hold, axis=1)
+    below = np.all(windows, axis=2)
+    return np.where(below.any(axis=1), below.argmax(axis=1) + 1.0, np.inf)
+
+
+@compiled
+def _trimmed_means(
+    ordered: NDArray[np.float64],
+    order: NDArray[np.int64],
+    counts: NDArray[np.int64],
+    trim: int,
+) -> NDArray[np.float64]:
+    """Return the trimmed mean of each draw at each point, shape (points, resamples).
+
+    Row p of `ordered` has the values of point p in order, and of `order` the seeds they belong to.
+    counts[r, s] is how often draw r has seed s. Walking along the order, the draw's values come
+    sorted without sorting each draw: value i fills the places from `placed` on, counts times.
+    """
+    n_points, n_seeds = ordered.shape
+    end = n_seeds - trim
+    means = np.empty((n_points, len(counts)))
+    for p in range(n_points):
+        for r in range(len(counts)):
+            placed, total = 0, 0.0
+            for i in range(n_seeds):
+                first = max(placed, trim)
+                placed += counts[r, order[p, i]]
+                if placed > first:  # also keeps infinities that are trimmed away out of the sum
+                    total += (min(placed, end) - first) * ordered[p, i]
+                    if placed >= end:
+                        break
+            means[p, r] = total / (end - trim)
+    return means
+
+
+def _trim(statistic: Statistic, n: int) -> int:
+    """Return how many of n ordered values `statistic` leaves out at either end."""
+    if statistic is np.mean:
+        return 0
+    if statistic is iqm:
+        return n // 4
+    if statistic is np.median:
+        return (n - 1) // 2
+    raise ValueError(f"statistic is {statistic!r}; allowed are np.median, np.mean and iqm")
+
+
+def _seed_counts(n_seeds: int, resamples: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Return how often each seed is drawn: n draws with replacement, shape (resamples, seeds)."""
+    return rng.multinomial(n_seeds, np.full(n_seeds, 1 / n_seeds), size=resamples)
+
+
+def _limits(drawn: NDArray[np.float64], level: float) -> tuple[Any, Any]:
+    """Return the percentile limits over the last axis, as values that occur.
+
+    No interpolation, because between two infinities there is no number.
+    """
+    low = np.quantile(drawn, (1 - level) / 2, axis=-1, method="lower")
+    high = np.quantile(drawn, (1 + level) / 2, axis=-1, method="higher")
+    return low, high
+
+
+def _checked_values(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    values = np.asarray(values, dtype=np.float64)
+    if values.ndim not in (1, 2) or values.size == 0:
+        raise ValueError(
+            f"{name} has shape {values.shape}; allowed are (seeds,) and (seeds, points), not empty"
+        )
+    return values
+
+
+def _checked_curves(curves: ArrayLike, name: str, length: int) -> NDArray[np.float64]:
+    curves = np.asarray(curves, dtype=np.float64)
+    if curves.ndim != 2:
+        raise ValueError(f"curves has shape {curves.shape}; allowed is (seeds, episodes)")
+    if not 1 <= length <= curves.shape[1]:
+        raise ValueError(f"{name} is {length}; allowed are 1 to {curves.shape[1]} episodes")
+    return curves
+
+
+def _check_draws(rng: object, level: float, resamples: int) -> None:
+    if not isinstance(rng, np.random.Generator):
+        raise TypeError(f"rng is {rng!r}; allowed is a numpy.random.Generator")
+    _check_level(level)
+    if resamples < 1:
+        raise ValueError(f"resamples is {resamples}; allowed are integers from 1")
+
+
+def _check_level(level: float) -> None:
+    if not 0 < level < 1:
+        raise ValueError(f"level is {level}; allowed are numbers between 0 and 1")

@@ -1,0 +1,389 @@
+"""Intervals, fractions and criteria against exact distributions and other formulas."""
+
+import itertools
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from scipy import stats
+
+from rl_core.statistics import (
+    bootstrap_interval,
+    episodes_to_threshold,
+    iqm,
+    learned,
+    learning_curves,
+    paired_difference_interval,
+    probability_of_improvement,
+    proportion_interval,
+)
+
+STATISTICS = [np.median, np.mean, iqm]
+numbers = st.floats(-1e6, 1e6)
+samples = hnp.arrays(np.float64, st.integers(1, 12), elements=numbers)
+quick = settings(max_examples=40, deadline=None)
+
+
+def generator(seed=0):
+    return np.random.default_rng(seed)
+
+
+# --- interquartile mean ---------------------------------------------------------------------------
+
+
+def test_iqm_is_the_mean_of_the_middle_half():
+    assert iqm([8.0, 1.0, 2.0, 900.0, 3.0, 4.0, 5.0, -80.0]) == pytest.approx((2 + 3 + 4 + 5) / 4)
+    # 30 seeds: floor(30 / 4) = 7 go at either end
+    values = generator().permutation(np.arange(30.0) ** 2)
+    assert iqm(values) == pytest.approx(np.mean(np.arange(7, 23) ** 2))
+
+
+def test_iqm_works_along_an_axis_and_lets_nan_through():
+    values = generator().normal(size=(9, 4))
+    values[3, 2] = np.nan
+    result = iqm(values, axis=0)
+    assert result.shape == (4,)
+    assert np.isnan(result).tolist() == [False, False, True, False]
+    np.testing.assert_allclose(iqm(values.T, axis=1), result)
+
+
+# --- bootstrap ------------------------------------------------------------------------------------
+
+
+def every_draw(values, statistic):
+    """All n^n equally likely draws: the distribution that the bootstrap samples from."""
+    return np.array([statistic(np.array(d)) for d in itertools.product(values, repeat=len(values))])
+
+
+@pytest.mark.parametrize("statistic", STATISTICS)
+@pytest.mark.parametrize("values", [[3.0, -1.0, 10.0, 4.5], [2.0, 2.0, 7.0, 1.0, 30.0]])
+def test_limits_are_quantiles_of_the_exact_bootstrap_distribution(statistic, values):
+    exact = every_draw(values, statistic)
+    level = 0.8
+    interval = bootstrap_interval(values, statistic, rng=generator(), level=level, resamples=50_000)
+    assert interval.estimate == pytest.approx(float(statistic(np.array(values))))
+    for limit, quantile in ((interval.low, 0.1), (interval.high, 0.9)):
+        # The limit occurs, and no more than the quantile's share lies on its far side (up to
+        # the noise of 50,000 draws: 0.005 is three standard deviations).
+        assert np.isclose(exact, limit).any()
+        assert np.mean(exact < limit - 1e-9) <= quantile + 0.005
+        assert np.mean(exact <= limit + 1e-9) >= quantile - 0.005
+
+
+@pytest.mark.parametrize("statistic", STATISTICS)
+def test_agrees_with_scipy(statistic):
+    values = generator(3).exponential(100.0, size=30)
+    ours = bootstrap_interval(values, statistic, rng=generator(1), resamples=40_000)
+    theirs = stats.bootstrap(
+        (values,), statistic, method="percentile", n_resamples=40_000, rng=generator(2)
+    ).confidence_interval
+    spread = theirs.high - theirs.low
+    assert abs(ours.low - theirs.low) < 0.05 * spread
+    assert abs(ours.high - theirs.high) < 0.05 * spread
+
+
+@pytest.mark.parametrize("statistic", STATISTICS)
+def test_every_draw_is_the_statistic_of_the_drawn_seeds(statistic):
+    values = generator(5).normal(size=(7, 3))
+    interval = bootstrap_interval(values, statistic, rng=generator(9), resamples=1)
+    counts = generator(9).multinomial(7, np.full(7, 1 / 7), size=1)[0]
+    drawn = statistic(np.repeat(values, counts, axis=0), axis=0)
+    np.testing.assert_allclose(interval.low, drawn, rtol=1e-12)
+    np.testing.assert_array_equal(interval.low, interval.high)
+
+
+def test_the_same_seeds_are_drawn_at_every_point():
+    values = generator(1).normal(size=(30, 1))
+    # 130 points, more than are treated at once; points that differ by a shift get shifted limits
+    curves = values + np.arange(130.0)
+    interval = bootstrap_interval(curves, rng=generator(2), resamples=500)
+    np.testing.assert_allclose(interval.low - np.arange(130.0), interval.low[0], atol=1e-9)
+    np.testing.assert_allclose(interval.high - np.arange(130.0), interval.high[0], atol=1e-9)
+    alone = bootstrap_interval(values[:, 0], rng=generator(2), resamples=500)
+    assert (alone.low, alone.high) == (interval.low[0], interval.high[0])
+
+
+@pytest.mark.parametrize(("statistic", "least"), [(np.mean, 0.90), (np.median, 0.90), (iqm, 0.89)])
+def test_covers_the_truth_as_often_as_promised(statistic, least):
+    # All experiments at once: each is a point of its own with 30 fresh seeds, true value 0.
+    experiments = generator(11).normal(size=(30, 1000))
+    interval = bootstrap_interval(experiments, statistic, rng=generator(12), resamples=1000)
+    covered = np.mean((interval.low <= 0) & (interval.high >= 0))
+    # The percentile interval at n = 30 is known to be a little short; 0.98 catches one too long.
+    assert least < covered < 0.98
+    short = bootstrap_interval(experiments, statistic, rng=generator(12), level=0.5, resamples=1000)
+    assert 0.44 < np.mean((short.low <= 0) & (short.high >= 0)) < 0.58
+
+
+@quick
+@given(samples, st.sampled_from(STATISTICS), st.integers(0, 100))
+def test_interval_holds_the_estimate_within_the_data(values, statistic, seed):
+    interval = bootstrap_interval(values, statistic, rng=generator(seed), level=0.99, resamples=200)
+    slack = 1e-9 * (1 + np.abs(values).max())
+    assert values.min() - slack <= interval.low <= interval.high <= values.max() + slack
+    wider = bootstrap_interval(values, statistic, rng=generator(seed), level=0.999, resamples=200)
+    assert wider.low <= interval.low
+    assert wider.high >= interval.high
+
+
+@quick
+@given(samples, st.sampled_from(STATISTICS), st.integers(0, 100), st.integers(-3, 3))
+def test_scaling_the_data_scales_the_interval(values, statistic, seed, exponent):
+    scale = 2.0**exponent
+    plain = bootstrap_interval(values, statistic, rng=generator(seed), resamples=100)
+    scaled = bootstrap_interval(scale * values, statistic, rng=generator(seed), resamples=100)
+    np.testing.assert_allclose(scaled, scale * np.array(plain), rtol=1e-9, atol=1e-9)
+
+
+@quick
+@given(samples, st.sampled_from(STATISTICS), st.integers(0, 100))
+def test_negating_the_data_mirrors_the_interval(values, statistic, seed):
+    plain = bootstrap_interval(values, statistic, rng=generator(seed), resamples=100)
+    mirrored = bootstrap_interval(-values, statistic, rng=generator(seed), resamples=100)
+    np.testing.assert_allclose(
+        [-mirrored.estimate, -mirrored.high, -mirrored.low], plain, rtol=1e-9, atol=1e-9
+    )
+
+
+def test_same_generator_same_bits_and_the_global_state_is_untouched():
+    values = generator().normal(size=30)
+    before = np.random.get_state()[1].copy()  # noqa: NPY002
+    assert bootstrap_interval(values, rng=generator(4)) == bootstrap_interval(
+        values, rng=generator(4)
+    )
+    assert bootstrap_interval(values, rng=generator(4)) != bootstrap_interval(
+        values, rng=generator(5)
+    )
+    np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
+
+
+def test_seeds_that_never_get_there_count_as_infinity():
+    values = [100.0, 110.0, 120.0, 130.0, np.inf]
+    interval = bootstrap_interval(values, rng=generator(), level=0.95)
+    assert interval.estimate == 120
+    assert 100 <= interval.low <= 110
+    assert interval.high == np.inf  # three of five draws are the infinite seed often enough
+    few = bootstrap_interval([*np.arange(29.0), np.inf], rng=generator())
+    assert few.high < 29
+    assert bootstrap_interval([*np.arange(29.0), np.inf], iqm, rng=generator()).high < 29
+    assert bootstrap_interval([*np.arange(29.0), np.inf], np.mean, rng=generator()).high == np.inf
+    lost = bootstrap_interval([np.inf, np.inf, 1.0], rng=generator())
+    assert lost == (np.inf, 1.0, np.inf)
+
+
+@pytest.mark.parametrize("statistic", STATISTICS)
+def test_a_nan_is_not_left_out_silently(statistic):
+    curves = generator().normal(size=(30, 3))
+    curves[7, 1] = np.nan
+    interval = bootstrap_interval(curves, statistic, rng=generator(), resamples=50)
+    for part in interval:
+        assert np.isnan(part).tolist() == [False, True, False]
+    assert np.isnan(bootstrap_interval(curves[:, 1], statistic, rng=generator(), resamples=5)).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "message"),
+    [
+        ({"values": []}, ValueError, r"values has shape \(0,\)"),
+        ({"values": np.zeros((2, 2, 2))}, ValueError, r"values has shape \(2, 2, 2\)"),
+        ({"statistic": np.max}, ValueError, "statistic is .*max.*allowed are np.median"),
+        ({"level": 1.0}, ValueError, "level is 1.0; allowed"),
+        ({"level": 95}, ValueError, "level is 95; allowed"),
+        ({"resamples": 0}, ValueError, "resamples is 0; allowed"),
+        ({"rng": 7}, TypeError, "rng is 7; allowed"),
+        ({"rng": np.random}, TypeError, "rng is .*; allowed"),
+    ],
+)
+def test_bootstrap_refuses(change, error, message):
+    arguments = {"values": [1.0, 2.0], "statistic": np.median, "rng": generator()} | change
+    with pytest.raises(error, match=message):
+        bootstrap_interval(**arguments)
+
+
+# --- comparing arms -------------------------------------------------------------------------------
+
+
+def test_pairing_removes_what_the_seeds_share():
+    shared = generator(1).normal(0, 100, size=30)
+    a, b = shared + 5 + generator(2).normal(size=30), shared
+    interval = paired_difference_interval(a, b, np.mean, rng=generator())
+    assert interval == bootstrap_interval(a - b, np.mean, rng=generator())
+    assert 4 < interval.low < interval.estimate < interval.high < 6
+
+
+def test_differences_refuse_what_cannot_be_subtracted():
+    with pytest.raises(ValueError, match=r"a has shape \(2,\), b has \(3,\)"):
+        paired_difference_interval([1.0, 2.0], [1.0, 2.0, 3.0], rng=generator())
+    with pytest.raises(ValueError, match="infinite"):
+        paired_difference_interval([1.0, np.inf], [1.0, np.inf], rng=generator())
+
+
+def test_probability_of_improvement_is_the_mann_whitney_statistic():
+    a = generator(1).integers(0, 10, size=30).astype(float)
+    b = generator(2).integers(2, 12, size=20).astype(float)
+    estimate, low, high = probability_of_improvement(a, b, rng=generator())
+    assert estimate == pytest.approx(stats.mannwhitneyu(b, a).statistic / (30 * 20))
+    assert 0 <= low < estimate < high <= 1
+    assert probability_of_improvement(b, a, rng=generator()).estimate == pytest.approx(1 - estimate)
+
+
+def test_probability_of_improvement_resamples_the_seeds_of_both_arms():
+    a, b = generator(1).normal(size=30), generator(2).normal(0.3, size=25)
+    ours = probability_of_improvement(a, b, rng=generator(), resamples=20_000)
+
+    def better(a, b, axis):
+        return np.mean(a[..., :, None] < b[..., None, :], axis=(-2, -1))
+
+    theirs = stats.bootstrap(
+        (a, b), better, method="percentile", n_resamples=5000, rng=generator(), batch=200
+    ).confidence_interval
+    assert ours.low == pytest.approx(theirs.low, abs=0.015)
+    assert ours.high == pytest.approx(theirs.high, abs=0.015)
+
+
+def test_probability_of_improvement_takes_infinities_and_refuses_nan():
+    assert probability_of_improvement([1.0, np.inf], [np.inf], rng=generator()).estimate == 0.75
+    with pytest.raises(ValueError, match="b has shape"):
+        probability_of_improvement([1.0], [np.nan], rng=generator())
+
+
+# --- fractions ------------------------------------------------------------------------------------
+
+
+@given(st.integers(1, 200), st.data(), st.sampled_from([0.8, 0.95, 0.99]))
+def test_wilson_limits_solve_the_score_equation(trials, data, level):
+    successes = data.draw(st.integers(0, trials))
+    estimate, low, high = proportion_interval(successes, trials, level=level)
+    assert estimate == successes / trials
+    # Wilson (1927): (estimate - p)^2 = z^2 p (1 - p) / n, a quadratic in p
+    z2 = stats.norm.ppf((1 + level) / 2) ** 2 / trials
+    roots = np.roots([1 + z2, -(2 * estimate + z2), estimate**2])
+    np.testing.assert_allclose([low, high], np.sort(roots.real), atol=1e-7)
+
+
+def test_wilson_interval_covers_as_often_as_promised_at_thirty_seeds():
+    # Exactly, by summing over all outcomes
+    for p in np.linspace(0.05, 0.95, 19):
+        intervals = [proportion_interval(k, 30) for k in range(31)]
+        covered = [low <= p <= high for _, low, high in intervals]
+        assert 0.91 < np.sum(stats.binom.pmf(np.arange(31), 30, p)[covered]) < 0.99
+
+
+@pytest.mark.parametrize(
+    ("successes", "trials", "level", "message"),
+    [
+        (5, 4, 0.95, "successes is 5, trials 4; allowed"),
+        (-1, 4, 0.95, "successes is -1, trials 4; allowed"),
+        (0, 0, 0.95, "successes is 0, trials 0; allowed"),
+        (1, 2, 1.5, "level is 1.5; allowed"),
+    ],
+)
+def test_fractions_refuse(successes, trials, level, message):
+    with pytest.raises(ValueError, match=message):
+        proportion_interval(successes, trials, level=level)
+
+
+# --- learning curves ------------------------------------------------------------------------------
+
+
+def episodes_table(steps_by_seed):
+    rows = [
+        (seed, episode, float(steps))
+        for seed, column in steps_by_seed.items()
+        for episode, steps in enumerate(column, start=1)
+    ]
+    return pd.DataFrame(rows, columns=["seed", "episode", "steps"])
+
+
+def test_curves_are_aligned_by_seed_and_end_where_the_seed_stopped():
+    table = episodes_table({3: [30, 10, 20, 40], 8: [7, 5]}).sample(frac=1, random_state=0)
+    curves = learning_curves(table, seeds=[8, 1, 3], episodes=5, window=3)
+    nan = np.nan
+    np.testing.assert_array_equal(curves, [[7, 6, nan, nan, nan], [nan] * 5, [30, 20, 20, 20, nan]])
+    means = learning_curves(table, seeds=[3, 8], episodes=4, window=2, average="mean")
+    np.testing.assert_allclose(means[0], [30, 20, 15, 30])
+
+
+@quick
+@given(
+    hnp.arrays(np.float64, st.tuples(st.integers(1, 4), st.integers(1, 12)), elements=numbers),
+    st.integers(1, 15),
+    st.sampled_from(["median", "mean"]),
+)
+def test_curves_are_trailing_averages(steps, window, average):
+    table = episodes_table(dict(enumerate(steps)))
+    n_seeds, n_episodes = steps.shape
+    curves = learning_curves(
+        table, seeds=range(n_seeds), episodes=n_episodes, window=window, average=average
+    )
+    for t in range(n_episodes):
+        part = steps[:, max(0, t + 1 - window) : t + 1]
+        np.testing.assert_allclose(
+            curves[:, t], getattr(np, average)(part, axis=1), rtol=1e-9, atol=1e-6
+        )
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"column": "reward"}, r"column is 'reward'; allowed are \['seed', 'episode', 'steps'\]"),
+        ({"window": 0}, "window is 0"),
+        ({"average": "max"}, "average 'max'"),
+        ({"seeds": [1]}, r"seeds \[0\] besides"),
+        ({"episodes": 2}, "episodes 1 to 3; allowed are episodes 1 to 2"),
+        ({"table": pd.concat([episodes_table({0: [1]})] * 2)}, "several rows"),
+    ],
+)
+def test_curves_refuse(change, message):
+    arguments = {"table": episodes_table({0: [1, 2, 3], 1: [1]}), "seeds": [0, 1], "episodes": 3}
+    with pytest.raises(ValueError, match=message):
+        learning_curves(**(arguments | change))
+
+
+def test_learned_looks_at_the_median_of_the_last_episodes():
+    curves = np.full((5, 10), 500.0)
+    curves[0, -4:] = 100  # all of the window
+    curves[1, -3:] = [100, 900, 100]  # most of the window, and of 100 and 500 not half
+    curves[2, :-4] = 100  # forgot
+    curves[3, -4:] = [100, 100, 100, np.nan]  # stopped
+    curves[4, -4:] = [np.inf, 100, 100, 100]
+    assert learned(curves, 100, window=4).tolist() == [True, False, False, False, True]
+    assert learned(curves[:, :6], 100, window=4).tolist() == [False, False, True, False, False]
+
+
+def test_episodes_to_threshold_needs_the_curve_to_hold():
+    curves = [[9, 3, 9, 3, 3, 3, 9], [3, 3, 3, 3, 3, 3, 3], [9, 9, 9, 9, 9, 3, 3]]
+    assert episodes_to_threshold(curves, 3).tolist() == [2, 1, 6]
+    assert episodes_to_threshold(curves, 3, hold=3).tolist() == [4, 1, math.inf]
+    assert episodes_to_threshold([[np.nan, 2, np.nan]], 3, hold=2).tolist() == [math.inf]
+
+
+@quick
+@given(
+    hnp.arrays(np.float64, (3, 12), elements=st.integers(0, 9).map(float)),
+    st.integers(0, 9),
+    st.integers(1, 12),
+)
+def test_episodes_to_threshold_is_the_first_that_holds(curves, threshold, hold):
+    found = episodes_to_threshold(curves, threshold, hold=hold)
+    for curve, first in zip(curves, found, strict=True):
+        holds = [
+            episode
+            for episode in range(1, 14 - hold)
+            if all(curve[episode - 1 : episode - 1 + hold] <= threshold)
+        ]
+        assert first == min(holds, default=math.inf)
+
+
+@pytest.mark.parametrize(
+    ("function", "arguments"), [(learned, {"window": 5}), (episodes_to_threshold, {"hold": 0})]
+)
+def test_criteria_refuse(function, arguments):
+    with pytest.raises(ValueError, match="allowed are 1 to 4 episodes"):
+        function(np.zeros((2, 4)), 1.0, **arguments)
+    with pytest.raises(ValueError, match=r"curves has shape \(4,\)"):
+        function(np.zeros(4), 1.0, **arguments)
