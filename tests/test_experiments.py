@@ -1,0 +1,566 @@
+"""The same bits however an experiment is run: blocks, workers, Dask, kills, damage."""
+
+import dataclasses
+import getpass
+import os
+import random
+import select
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+import toy_experiment
+import toy_learner
+from toy_learner import ToyConfig, count_threads, learn
+
+import rl_core
+from rl_core import experiments
+from rl_core.experiments import Arm, DamagedResultWarning, run
+from rl_core.reinforce import ReinforceConfig, reinforce
+from rl_core.store import ARRAYS, RECORD, TABLE, Store
+
+TESTS = Path(__file__).parent
+PLAIN = Arm("plain", learn, "toy", ToyConfig(), 20, (0, 20))
+BOLD = Arm("bold", learn, "toy", ToyConfig(step_size=0.5, diverging=(2,)), 15)
+ACROBOT = Arm(
+    "Acrobot", reinforce, "Acrobot-v1", ReinforceConfig(max_episode_steps=300), 4, (0, 2, 4)
+)
+quiet = {"progress": False}
+
+
+def direct(arm, seeds):
+    """What the learner itself gives, all seeds in one stack."""
+    return arm.algorithm(
+        arm.env, arm.config, episodes=arm.episodes, seeds=list(seeds), snapshots=arm.snapshots
+    )
+
+
+def assert_results_are(results, arms, seeds):
+    """Compare with the learner called directly, every bit."""
+    tables = []
+    for arm in arms:
+        expected = direct(arm, seeds)
+        by_seed = [expected.table[expected.table.seed == seed] for seed in seeds]
+        table = pd.concat(by_seed, ignore_index=True)
+        table.insert(0, "arm", arm.name)
+        tables.append(table)
+        arrays = results.arrays(arm.name)
+        assert sorted(arrays) == sorted(expected.arrays)
+        for name, array in expected.arrays.items():
+            assert arrays[name].dtype == array.dtype
+            assert arrays[name].shape == array.shape
+            assert arrays[name].tobytes() == array.tobytes()
+        failures = results.failures[results.failures.arm == arm.name].drop(columns="arm")
+        assert failures.to_dict("records") == [dataclasses.asdict(f) for f in expected.failures]
+    pd.testing.assert_frame_equal(
+        results.table, pd.concat(tables, ignore_index=True), check_exact=True
+    )
+
+
+@pytest.fixture
+def blocks_run(monkeypatch):
+    """List the arms and seeds of the blocks that are run, in order; needs workers=1."""
+    blocks = []
+
+    def recorded(block, store):
+        blocks.append((block.arm.name, block.seeds))
+        return original(block, store)
+
+    original = experiments.run_block
+    monkeypatch.setattr(experiments, "run_block", recorded)
+    return blocks
+
+
+# --- the same bits --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("block", [1, 4, 30])
+def test_blocks_of_any_size_give_the_same_bits(tmp_path, block):
+    results = run([PLAIN, BOLD], seeds=range(30), store=tmp_path, workers=1, block=block, **quiet)
+    assert_results_are(results, [PLAIN, BOLD], range(30))
+
+
+@pytest.mark.parametrize("arm", [BOLD, ACROBOT])
+def test_a_seed_alone_gives_the_bits_it_has_among_thirty(tmp_path, arm):
+    thirty = run([arm], seeds=range(30), store=tmp_path / "30", workers=1, block=30, **quiet)
+    for seed in (2, 9):
+        alone = run([arm], seeds=[seed], store=tmp_path / "1", workers=1, **quiet)
+        table = thirty.table[thirty.table.seed == seed].reset_index(drop=True)
+        pd.testing.assert_frame_equal(alone.table, table, check_exact=True)
+        stacked = thirty.arrays(arm.name)
+        for name, array in alone.arrays(arm.name).items():
+            assert array[0].tobytes() == stacked[name][seed].tobytes()
+    # and two seeds have nothing in common
+    assert len({array.tobytes() for array in stacked[name]}) == 30
+
+
+@pytest.mark.parametrize("backend", ["loky", "threading", "multiprocessing"])
+def test_two_workers_give_the_same_bits(tmp_path, backend):
+    arms = [PLAIN, BOLD, ACROBOT]
+    results = run(arms, seeds=range(6), store=tmp_path, block=2, backend=backend, **quiet)
+    assert_results_are(results, arms, range(6))
+
+
+def test_dask_gives_the_same_bits(tmp_path):
+    from distributed import Client, LocalCluster
+
+    with (
+        LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as cluster,
+        Client(cluster),
+    ):
+        arms = [PLAIN, BOLD, ACROBOT]
+        results = run(arms, seeds=range(6), store=tmp_path, backend="dask", block=2, **quiet)
+    assert_results_are(results, arms, range(6))
+
+
+def test_dask_needs_a_client_only_for_work(tmp_path):
+    with pytest.raises(ValueError, match="Client"):
+        run([PLAIN], seeds=[0], store=tmp_path, backend="dask", **quiet)
+    run([PLAIN], seeds=[0], store=tmp_path, workers=1, **quiet)
+    assert len(run([PLAIN], seeds=[0], store=tmp_path, backend="dask", **quiet).table) == 20
+
+
+def test_the_order_is_that_of_the_arguments(tmp_path):
+    seeds = [7, 2, 5]
+    results = run([BOLD, PLAIN], seeds=seeds, store=tmp_path, workers=1, block=2, **quiet)
+    assert_results_are(results, [BOLD, PLAIN], seeds)
+    assert list(results.provenance.seed) == seeds * 2
+
+
+def test_global_random_states_are_untouched(tmp_path):
+    numpy_before, torch_before = np.random.get_state()[1].copy(), torch.get_rng_state()  # noqa: NPY002
+    python_before = random.getstate()
+    run([PLAIN], seeds=range(2), store=tmp_path, workers=1)
+    np.testing.assert_array_equal(np.random.get_state()[1], numpy_before)  # noqa: NPY002
+    assert torch.equal(torch.get_rng_state(), torch_before)
+    assert random.getstate() == python_before
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_worker_uses_one_thread(tmp_path, workers):
+    before = torch.get_num_threads()
+    torch.set_num_threads(3)
+    try:
+        arm = Arm("threads", count_threads, "toy", ToyConfig(), 1)
+        results = run([arm], seeds=[0, 1], store=tmp_path, workers=workers, block=1, **quiet)
+        assert torch.get_num_threads() == 3
+    finally:
+        torch.set_num_threads(before)
+    assert results.arrays("threads")["threads"].tolist() == [1, 1]
+
+
+def test_a_worker_sees_to_its_threads_itself(tmp_path, monkeypatch):
+    monkeypatch.setattr(experiments, "use_threads", lambda _: 1)  # the main process does not
+    before = torch.get_num_threads()
+    torch.set_num_threads(3)
+    try:
+        arm = Arm("threads", count_threads, "toy", ToyConfig(), 1)
+        results = run([arm], seeds=[0], store=tmp_path, workers=1, **quiet)
+    finally:
+        torch.set_num_threads(before)
+    assert results.arrays("threads")["threads"].tolist() == [1]
+
+
+# --- read, not run --------------------------------------------------------------------------------
+
+
+def test_what_is_stored_is_not_run_again(tmp_path, blocks_run):
+    first = run([PLAIN], seeds=range(3), store=tmp_path, workers=1, block=2, **quiet)
+    assert blocks_run == [("plain", (0, 1)), ("plain", (2,))]
+    again = run([PLAIN], seeds=range(3), store=Store(tmp_path), workers=1, block=7, **quiet)
+    assert len(blocks_run) == 2
+    pd.testing.assert_frame_equal(again.table, first.table, check_exact=True)
+    pd.testing.assert_frame_equal(again.provenance, first.provenance, check_exact=True)
+
+
+def test_more_seeds_run_only_the_new_ones(tmp_path, blocks_run):
+    run([PLAIN], seeds=range(3), store=tmp_path, workers=1, **quiet)
+    blocks_run.clear()
+    results = run([PLAIN], seeds=range(30), store=tmp_path, workers=1, block=15, **quiet)
+    assert blocks_run == [("plain", tuple(range(3, 17))), ("plain", tuple(range(17, 30)))]
+    assert_results_are(results, [PLAIN], range(30))
+
+
+def test_arms_that_differ_in_name_only_share_their_results(tmp_path, blocks_run):
+    other = dataclasses.replace(PLAIN, name="baseline")
+    results = run([PLAIN, other], seeds=range(2), store=tmp_path, workers=1, **quiet)
+    assert blocks_run == [("plain", (0, 1))]
+    assert_results_are(results, [PLAIN, other], range(2))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"config": ToyConfig(step_size=0.1000000000000001)},
+        {"env": "toy 2"},
+        {"episodes": 21},
+        {"snapshots": (0,)},
+        {"algorithm": count_threads},
+    ],
+)
+def test_whatever_makes_a_result_makes_its_digest(change):
+    changed = dataclasses.replace(PLAIN, **change)
+    assert experiments.provenance.digest(changed.identity()) != experiments.provenance.digest(
+        PLAIN.identity()
+    )
+
+
+@pytest.mark.parametrize("library", ["gymnasium", "numba", "numpy", "pandas", "torch"])
+def test_another_version_of_a_library_runs_again(tmp_path, monkeypatch, blocks_run, library):
+    run([PLAIN], seeds=[0], store=tmp_path, workers=1, **quiet)
+    version = experiments.provenance.importlib.metadata.version
+    monkeypatch.setattr(
+        experiments.provenance.importlib.metadata,
+        "version",
+        lambda name: "0.0.1" if name == library else version(name),
+    )
+    results = run([PLAIN], seeds=[0], store=tmp_path, workers=1, **quiet)
+    assert len(blocks_run) == 2
+    assert list(results.provenance[library]) == ["0.0.1"]
+
+
+def test_python_itself_counts(monkeypatch):
+    before = PLAIN.identity()
+    monkeypatch.setattr(experiments.provenance.platform, "python_version", lambda: "3.99.0")
+    assert PLAIN.identity() != before
+
+
+def test_what_takes_longest_goes_first(tmp_path, blocks_run):
+    long = Arm("long", learn, "toy", ToyConfig(seconds=0.01), 5)
+    short = Arm("short", learn, "toy", ToyConfig(), 40)
+    run([long, short], seeds=[0], store=tmp_path, workers=1, **quiet)
+    assert blocks_run == [("short", (0,)), ("long", (0,))]  # unknown: by episodes
+    blocks_run.clear()
+    new = Arm("new", learn, "toy", ToyConfig(step_size=0.3), 1)
+    run([short, long, new], seeds=[0, 1], store=tmp_path, workers=1, **quiet)
+    assert blocks_run == [("new", (0, 1)), ("long", (1,)), ("short", (1,))]
+
+
+# --- what is told besides -------------------------------------------------------------------------
+
+
+def test_failures_are_stored_and_reported(tmp_path, blocks_run):
+    for _ in range(2):
+        results = run([PLAIN, BOLD], seeds=range(4), store=tmp_path, workers=1, **quiet)
+        assert results.failures.to_dict("records") == [
+            {"arm": "bold", "seed": 2, "episode": 3, "reason": "weights are NaN"}
+        ]
+    assert len(blocks_run) == 2
+    rows = results.table[(results.table.arm == "bold")].groupby("seed").size()
+    assert rows.to_dict() == {0: 15, 1: 15, 2: 3, 3: 15}
+    none = run([PLAIN], seeds=range(4), store=tmp_path, workers=1, **quiet).failures
+    assert list(none.columns) == ["arm", "seed", "episode", "reason"]
+    assert none.empty
+
+
+def test_provenance_tells_what_made_a_result(tmp_path):
+    arm = dataclasses.replace(PLAIN, config=ToyConfig(seconds=0.001))
+    provenance = run([arm], seeds=range(5), store=tmp_path, workers=1, block=3, **quiet).provenance
+    assert list(provenance.columns[:3]) == ["arm", "seed", "digest"]
+    row = provenance.iloc[4]
+    assert row.algorithm == "toy_learner:learn"
+    assert '"step_size":0.1' in row.config
+    assert (row.env, row.episodes, row.snapshots, row.block_seeds) == ("toy", 20, (0, 20), 2)
+    assert row.torch == torch.__version__
+    assert row.processor
+    assert row.date[:2] == "20"
+    assert row.block_seconds >= 20 * 2 * 0.001
+    totals = provenance.block_seconds.iloc[[0, 3]].sum()
+    assert provenance.seconds.sum() == pytest.approx(totals)
+    steps = direct(arm, [3, 4]).arrays["env_steps"].sum()
+    assert row.env_steps_per_second == pytest.approx(steps / row.block_seconds)
+
+
+def test_nothing_stored_tells_of_this_machine_but_its_processor(tmp_path):
+    results = run([PLAIN], seeds=[0], store=tmp_path, workers=1, **quiet)
+    (folder,) = (tmp_path / "results").iterdir()
+    assert folder.name == results.provenance.digest[0]
+    content = b"".join(path.read_bytes() for path in folder.iterdir()).decode("latin-1")
+    package = str(Path(rl_core.__file__).parent)
+    for telling in (str(tmp_path), package, str(Path.home()) + "/", socket.gethostname()):
+        assert telling not in content
+    assert f'"{getpass.getuser()}"' not in content
+
+
+def test_arrays_of_an_unknown_arm(tmp_path):
+    results = run([PLAIN], seeds=[0], store=tmp_path, workers=1, **quiet)
+    with pytest.raises(ValueError, match=r"arm is 'bold'; allowed are \['plain'\]"):
+        results.arrays("bold")
+
+
+# --- what goes wrong ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_failing_block_does_not_take_the_others_down(tmp_path, workers):
+    raising = Arm("raising", learn, "toy", ToyConfig(raising=(3, 4)), 15)
+    arguments = {"seeds": range(6), "store": tmp_path, "workers": workers, "block": 2, **quiet}
+    with pytest.raises(ExceptionGroup, match="2 of 6 blocks failed") as caught:
+        run([raising, PLAIN], **arguments)
+    messages = sorted(str(error) for error in caught.value.exceptions)
+    assert messages == [
+        "arm 'raising', seeds 2, 3: ValueError: cannot learn from 3",
+        "arm 'raising', seeds 4, 5: ValueError: cannot learn from 4",
+    ]
+    assert "toy_learner.py" in caught.value.exceptions[0].__notes__[0]  # the worker's traceback
+    assert len(list((tmp_path / "results").iterdir())) == 2 + 6
+    assert list((tmp_path / "scratch").iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("returned", "message"),
+    [
+        (None, "returned NoneType; allowed is a Run"),
+        (rl_core.run.Run(pd.DataFrame({"steps": [1]})), "'seed' is needed"),
+        (rl_core.run.Run(pd.DataFrame({"seed": [1], "arm": ["a"]})), "'arm' is not"),
+        (rl_core.run.Run(pd.DataFrame({"seed": [9]})), r"seeds \[9\]; asked were \[0\]"),
+        (
+            rl_core.run.Run(pd.DataFrame({"seed": [0]}), {"weights": np.zeros((2, 3))}),
+            r"array 'weights' has shape \(2, 3\); its first axis must be 1 seeds",
+        ),
+    ],
+)
+def test_what_is_no_proper_run_is_not_stored(tmp_path, monkeypatch, returned, message):
+    monkeypatch.setattr(toy_learner, "broken", lambda *_, **__: returned, raising=False)
+    toy_learner.broken.__module__, toy_learner.broken.__qualname__ = "toy_learner", "broken"
+    arm = Arm("broken", toy_learner.broken, "toy", ToyConfig(), 5)
+    with pytest.raises(ExceptionGroup) as caught:
+        run([arm], seeds=[0], store=tmp_path, workers=1, **quiet)
+    assert caught.group_contains(RuntimeError, match=message)
+    assert not (tmp_path / "results").exists()
+
+
+@pytest.mark.parametrize("file", [TABLE, ARRAYS, RECORD])
+@pytest.mark.parametrize("damage", ["truncated", "flipped", "missing"])
+def test_a_damaged_result_is_named_and_made_again(tmp_path, blocks_run, file, damage):
+    before = run([BOLD, PLAIN], seeds=range(3), store=tmp_path, workers=1, **quiet)
+    digest = before.provenance.digest[4]  # plain, seed 1
+    path = tmp_path / "results" / digest / file
+    content = bytearray(path.read_bytes())
+    chance = random.Random(f"{file} {damage}")
+    if damage == "truncated":
+        path.write_bytes(content[: chance.randrange(len(content))])
+    elif damage == "flipped":
+        content[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
+        path.write_bytes(content)
+    else:
+        path.unlink()
+    blocks_run.clear()
+    with pytest.warns(DamagedResultWarning) as caught:
+        results = run([BOLD, PLAIN], seeds=range(3), store=tmp_path, workers=1, **quiet)
+    (warning,) = caught
+    assert str(path) in str(warning.message)
+    assert str(warning.message).startswith("arm 'plain', seed 1: ")
+    assert warning.filename == __file__
+    assert blocks_run == [("plain", (1,))]
+    assert_results_are(results, [BOLD, PLAIN], range(3))
+    run([BOLD, PLAIN], seeds=range(3), store=tmp_path, workers=1, **quiet)
+    assert len(blocks_run) == 1
+
+
+@dataclasses.dataclass
+class Thawed:
+    """A config that can change."""
+
+    step_size: float = 0.1
+
+
+@dataclasses.dataclass(frozen=True)
+class Odd:
+    """A config that JSON cannot tell from others."""
+
+    thing: object = dataclasses.field(default_factory=lambda: {1, 2})
+
+
+def in_main(*_, **__):
+    """A function that a notebook or script defines: workers have another `__main__`."""
+
+
+in_main.__module__ = "__main__"
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "message"),
+    [
+        ({"name": ""}, TypeError, "name is ''; allowed"),
+        ({"env": None}, TypeError, "env is None; allowed"),
+        ({"config": Thawed()}, TypeError, "config is Thawed.*; allowed is a frozen dataclass"),
+        ({"config": {"gamma": 1}}, TypeError, "config is .*; allowed is a frozen dataclass"),
+        ({"config": ToyConfig}, TypeError, "config is .*; allowed is a frozen dataclass"),
+        ({"config": Odd()}, TypeError, r"config\.thing is \{1, 2\} of type set; allowed are"),
+        ({"episodes": 0}, ValueError, "episodes has 0; allowed are integers from 1"),
+        ({"episodes": 10.0}, TypeError, r"episodes has 10\.0; allowed"),
+        ({"episodes": True}, TypeError, "episodes has True; allowed"),
+        ({"snapshots": [0]}, TypeError, r"snapshots is \[0\]; allowed is a tuple"),
+        ({"snapshots": (21,)}, ValueError, "snapshots has 21; allowed are 0 to 20"),
+        ({"snapshots": (-1,)}, ValueError, "snapshots has -1; allowed"),
+        ({"algorithm": lambda: None}, TypeError, "algorithm is .*; allowed is a function"),
+        ({"algorithm": "learn"}, TypeError, "algorithm is 'learn'; allowed is a function"),
+        ({"algorithm": in_main}, TypeError, "algorithm is .*; allowed is a function"),
+        ({"algorithm": Store.read}, TypeError, "algorithm is .*; allowed is a function"),
+    ],
+)
+def test_an_arm_refuses(monkeypatch, change, error, message):
+    monkeypatch.setattr(sys.modules["__main__"], "in_main", in_main, raising=False)
+    with pytest.raises(error, match=message):
+        dataclasses.replace(PLAIN, **change)
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "message"),
+    [
+        ({"arms": []}, ValueError, r"arms has the names \[\]"),
+        ({"arms": [PLAIN, PLAIN]}, ValueError, "each name once"),
+        ({"arms": PLAIN}, TypeError, "arms is Arm.*allowed is a sequence"),
+        ({"arms": ["plain"]}, TypeError, "arms has 'plain'"),
+        ({"seeds": []}, ValueError, r"seeds is \[\]; allowed is at least one"),
+        ({"seeds": [1, 2, 1]}, ValueError, r"seeds is \[1, 2, 1\]; allowed is .* each once"),
+        ({"seeds": [1, np.int64(1)]}, ValueError, "each once"),
+        ({"seeds": [0, -3]}, ValueError, "seeds has -3; allowed are integers from 0"),
+        ({"seeds": [0.5]}, TypeError, r"seeds has 0\.5; allowed are integers"),
+        ({"seeds": [True]}, TypeError, "seeds has True; allowed are integers"),
+        ({"seeds": 30}, TypeError, "seeds is 30; allowed is an iterable"),
+        ({"workers": 0}, ValueError, "workers has 0; allowed are integers from 1"),
+        ({"workers": 1.5}, TypeError, r"workers has 1\.5; allowed"),
+        ({"block": 0}, ValueError, "block has 0; allowed are integers from 1"),
+        ({"backend": "Dask"}, ValueError, "backend is 'Dask'; allowed are .*'dask'.*'loky'"),
+    ],
+)
+def test_run_refuses(tmp_path, change, error, message):
+    arguments = {"arms": [PLAIN], "seeds": [0], "store": tmp_path / "store"} | change
+    with pytest.raises(error, match=message):
+        run(arguments.pop("arms"), **arguments)
+    assert not (tmp_path / "store").exists()
+
+
+# --- several processes, and kills -----------------------------------------------------------------
+
+
+def start(*command, **options):
+    """Start a program in a process group of its own."""
+    path = os.pathsep.join([str(TESTS), str(Path(rl_core.__file__).parents[1])])
+    return subprocess.Popen(
+        [sys.executable, "-W", "error", *map(str, command)],
+        env={**os.environ, "PYTHONPATH": path},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        **options,
+    )
+
+
+def finish(process):
+    """Return what a program printed, once it has ended well."""
+    output, errors = process.communicate(timeout=120)
+    assert process.returncode == 0, errors
+    return output.split()
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(tmp_path_factory):
+    """The fingerprints of the experiments, from one process that ran them through."""
+    fingerprints = {}
+    for learner, arms in toy_experiment.ARMS.items():
+        store, seeds = tmp_path_factory.mktemp("store"), toy_experiment.SEEDS
+        results = run(arms, seeds=seeds, store=store, workers=1, **quiet)
+        assert_results_are(results, arms, seeds)
+        fingerprints[learner] = toy_experiment.fingerprint(results)
+    return fingerprints
+
+
+def test_two_runners_at_once_do_not_disturb_each_other(tmp_path, uninterrupted):
+    script = TESTS / "toy_experiment.py"
+    runners = [start(script, "toy", tmp_path, workers) for workers in (1, 2)]
+    for runner in runners:
+        assert finish(runner) == ["begun", uninterrupted["toy"]]
+    assert len(list((tmp_path / "results").iterdir())) == 12
+
+
+def wait_for_work(process, store, before):
+    """Wait until a worker of `process` has begun a block; return whether it has, or all is done."""
+    while not any(set(store.path.glob("scratch/*/*.json")) - before):
+        if select.select([process.stdout], [], [], 0.01)[0]:
+            return False
+    return True
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("learner", "workers", "kills", "latest"),
+    [("toy", 1, 12, 1.2), ("toy", 2, 5, 1.0), ("reinforce", 2, 3, 2.0)],
+)
+def test_killed_at_random_moments_and_resumed(
+    tmp_path, uninterrupted, learner, workers, kills, latest
+):
+    """Twenty kills together, each of the whole process group."""
+    program = (TESTS / "toy_experiment.py", learner)
+    moments = random.Random(workers)
+    store, stored = Store(tmp_path / "store 0"), 0
+    counts = []  # results in the store after each kill
+    while len(counts) < kills:
+        before = set(store.path.glob("scratch/*/*.json"))
+        with start(*program, store.path, workers) as process:
+            assert process.stdout.readline() == "begun\n"
+            moment = moments.uniform(0, latest)  # of an experiment that works about as long
+            finished = not wait_for_work(process, store, before)
+            if finished or select.select([process.stdout], [], [], moment)[0]:
+                assert process.stdout.readline().strip() == uninterrupted[learner]
+                # It was quicker than the kill: the next one starts from an empty store.
+                store, stored = Store(tmp_path / f"store {len(counts)}"), 0
+                continue
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
+        results = list(store.path.glob("results/*"))
+        for result in results:
+            assert store.read(result.name) is not None  # raises if there were half a result
+        assert len(results) >= stored  # what was stored stays
+        stored = len(results)
+        counts.append(stored)
+    if kills > 10:  # among so many, some came in the middle
+        assert any(0 < count < 12 for count in counts)
+    last = finish(start(*program, store.path, workers))
+    assert last == ["begun", uninterrupted[learner]]
+
+
+STALE = """
+import sys, pathlib
+sys.path.insert(0, {folder!r})
+import toy_copy
+from rl_core.experiments import Arm, run
+
+def steps():
+    arm = Arm("stale", toy_copy.learn, "toy", toy_copy.ToyConfig(), 3)
+    try:
+        results = run([arm], seeds=[0, 1], store={store!r}, workers={workers}, block=1)
+    except ExceptionGroup as group:
+        return group.exceptions[0]
+    return sorted(set(results.table.steps))
+
+if __name__ == "__main__":
+    assert len(steps()) > 1
+    source = pathlib.Path(toy_copy.__file__)
+    source.write_text(source.read_text().replace("stream.integers(1, 500)", "12345"))
+    print(steps())
+"""
+
+
+@pytest.mark.parametrize(
+    ("workers", "outcome"),
+    [(1, "toy_copy was changed after this process started: restart"), (2, "[12345]")],
+)
+def test_code_that_is_no_longer_on_disk_is_not_run(tmp_path, workers, outcome):
+    """Otherwise old code's results would be kept under the new code's digest."""
+    (tmp_path / "toy_copy.py").write_text((TESTS / "toy_learner.py").read_text())
+    script = tmp_path / "script.py"
+    store = str(tmp_path / "store")
+    script.write_text(STALE.format(folder=str(tmp_path), store=store, workers=workers))
+    assert outcome in " ".join(finish(start(script)))
