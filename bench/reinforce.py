@@ -1,0 +1,317 @@
+"""REINFORCE against the usual loop and Stable-Baselines3: microseconds an environment step.
+
+All learn with the same hyperparameters. Rates are taken over the beginning of training, the first
+episodes of a seed up to a budget of steps, because the usual loop would take hours for the rest;
+what the whole of our training takes is told beside it.
+"""
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from itertools import pairwise
+from unittest import mock
+
+import gymnasium as gym
+import numpy as np
+import torch
+from stable_baselines3 import A2C
+from stable_baselines3.common.env_util import make_vec_env
+from torch import nn
+from torch.distributions import Categorical as TorchCategorical
+from torch.distributions import Normal
+
+from rl_core import networks, policies, reinforce
+from rl_core.episodes import CompiledEnvironment
+from rl_core.policies import Gaussian, make_policy
+from rl_core.reinforce import ReinforceConfig
+
+SEEDS = range(30)
+BEGINNING = {"episodes": 50, "max_env_steps": 40_000}  # of a seed
+WHOLE = 2_000  # episodes
+ROUNDS = 3
+UNIT = "microseconds a step"
+CONFIGS = {
+    "Acrobot-v1": ReinforceConfig(max_episode_steps=5_000, learn_from_capped=False),
+    "MountainCar-v0": ReinforceConfig(max_episode_steps=100_000, learn_from_capped=False),
+    "MountainCarContinuous-v0": ReinforceConfig(
+        policy=Gaussian(mean="weights", sigma=0.5),
+        biases=False,
+        learning_rate=2e-3,
+        epochs=1,
+        normalise="centre",
+        max_episode_steps=100_000,
+        learn_from_capped=False,
+    ),
+}
+BUDGET = 5_000_000  # environment steps a seed, for the whole training
+
+
+class UsualAgent:
+    """REINFORCE as it is usually written: one Gymnasium environment, one torch network."""
+
+    def __init__(self, name: str, config: ReinforceConfig, seed: int) -> None:
+        torch.manual_seed(seed)
+        self.config = config
+        self.env = gym.make(name, max_episode_steps=config.max_episode_steps)
+        self.gaussian = isinstance(config.policy, Gaussian)
+        n_in = self.env.observation_space.shape[0]
+        n_out = n_in if self.gaussian else self.env.action_space.n
+        widths = (n_in, *config.hidden, n_out)
+        layers = []
+        for a, b in pairwise(widths):
+            layers += [nn.Linear(a, b, bias=config.biases), nn.ReLU()]
+        self.network = nn.Sequential(*layers[:-1])
+        self.optimiser = torch.optim.Adam(self.network.parameters(), lr=config.learning_rate)
+
+    def distribution(self, states: torch.Tensor) -> torch.distributions.Distribution:
+        """pi(.|s), validation switched off as the fastest loops do."""
+        outputs = self.network(states)
+        if self.gaussian:
+            means = (outputs * states).sum(-1, keepdim=True)
+            return Normal(means, self.config.policy.sigma, validate_args=False)
+        return TorchCategorical(logits=outputs, validate_args=False)
+
+    def act(self, state: np.ndarray) -> int | np.ndarray:
+        """Draw an action."""
+        with torch.no_grad():
+            action = self.distribution(torch.from_numpy(state)).sample()
+        return action.numpy() if self.gaussian else int(action)
+
+    def learn(self, states: list, actions: list, rewards: list) -> None:
+        """All epochs over one episode."""
+        config, v, following = self.config, np.empty(len(rewards)), 0.0
+        for t in range(len(rewards) - 1, -1, -1):
+            v[t] = following = rewards[t] + config.gamma * following
+        v -= v.mean()
+        if config.normalise == "standard" and v.std() > 0:
+            v /= v.std()
+        s = torch.from_numpy(np.array(states))
+        a, v = torch.from_numpy(np.array(actions)), torch.from_numpy(v).float()
+        for _ in range(config.epochs):
+            for batch in torch.randperm(len(v)).split(config.batch_size):
+                logs = self.distribution(s[batch]).log_prob(a[batch]).reshape(len(batch))
+                loss = -(logs * v[batch]).mean()
+                self.optimiser.zero_grad()
+                loss.backward()
+                self.optimiser.step()
+
+    def train(self, episodes: int, max_env_steps: int, seed: int) -> int:
+        """Return the number of environment steps."""
+        env_steps = 0
+        state, _ = self.env.reset(seed=seed)
+        for _ in range(episodes):
+            states, actions, rewards, over = [], [], [], False
+            while not over and env_steps < max_env_steps:
+                states.append(state)
+                actions.append(self.act(state))
+                state, reward, terminated, truncated, _ = self.env.step(actions[-1])
+                rewards.append(reward)
+                env_steps += 1
+                over = terminated or truncated
+            if terminated:
+                self.learn(states, actions, rewards)
+            if env_steps >= max_env_steps:
+                break
+            state, _ = self.env.reset()
+        return env_steps
+
+
+def usual_loop(name: str, seed: int) -> int:
+    """Train the usual agent for the beginning; return its environment steps."""
+    return UsualAgent(name, CONFIGS[name], seed).train(**BEGINNING, seed=seed)
+
+
+def ours(name: str, seeds: range = SEEDS, **changes: int) -> int:
+    """Train all seeds, for the beginning unless told otherwise; return the environment steps."""
+    config = replace(CONFIGS[name], max_env_steps=changes.get("budget", BEGINNING["max_env_steps"]))
+    episodes = changes.get("episodes", BEGINNING["episodes"])
+    table = reinforce.reinforce(name, config, episodes=episodes, seeds=seeds).table
+    return int(table["steps"].sum())
+
+
+def a2c(name: str, seed: int, steps: int = 20_000) -> int:
+    """Stable-Baselines3's A2C with 16 environments, network and learning rate the same."""
+    model = A2C(
+        "MlpPolicy",
+        make_vec_env(name, n_envs=16, seed=seed),
+        gamma=0.99,
+        learning_rate=1e-3,
+        use_rms_prop=False,
+        policy_kwargs={"net_arch": [10, 20], "activation_fn": nn.ReLU},
+        device="cpu",
+        seed=seed,
+    )
+    model.learn(steps)
+    return int(model.num_timesteps)
+
+
+def microseconds(way: Callable[[], int]) -> float:
+    """Wall time a step of one call."""
+    start = time.perf_counter()
+    steps = way()
+    return (time.perf_counter() - start) / steps * 1e6
+
+
+def where_time_goes(name: str) -> str:
+    """Shares of episodes, learner and rest, and the time of the whole training of 30 seeds."""
+    spent = {"episodes": 0.0, "learner": 0.0}
+
+    def timed(part: str, function: Callable) -> Callable:
+        def call(*arguments: object) -> object:
+            start = time.perf_counter()
+            result = function(*arguments)
+            spent[part] += time.perf_counter() - start
+            return result
+
+        return call
+
+    play = timed("episodes", CompiledEnvironment.play)
+    learner = timed("learner", reinforce._learn)
+    start = time.perf_counter()
+    with (
+        mock.patch.object(CompiledEnvironment, "play", lambda *a: play(*a)),
+        mock.patch.object(reinforce, "_learn", learner),
+    ):
+        steps = ours(name, episodes=WHOLE, budget=BUDGET)
+    seconds = time.perf_counter() - start
+    shares = {**spent, "rest": seconds - sum(spent.values())}
+    parts = ", ".join(f"{part} {share / seconds:.0%}" for part, share in shares.items())
+    return (
+        f"whole training, {len(SEEDS)} seeds x {WHOLE} episodes: {seconds:.0f} s, "
+        f"{steps / 1e6:.0f} million steps, {seconds / steps * 1e6:.2f} us a step ({parts})"
+    )
+
+
+def stacked_update(n_networks: int, n: int) -> Callable[[], int]:
+    """One minibatch of n for each of many networks in torch: baddbmm, autograd, fused Adam."""
+    widths = (6, 10, 20, 3)
+    shapes = list(pairwise(widths))
+    weights = [(torch.randn(n_networks, a, b) / math.sqrt(a)).requires_grad_() for a, b in shapes]
+    biases = [torch.zeros(n_networks, 1, b, requires_grad=True) for _, b in shapes]
+    optimiser = torch.optim.Adam([*weights, *biases], lr=1e-3, fused=True)
+    states = torch.randn(n_networks, n, 6)
+    actions, v = torch.randint(0, 3, (n_networks, n, 1)), torch.randn(n_networks, n)
+
+    def update() -> int:
+        h = states
+        for layer, (weight, bias) in enumerate(zip(weights, biases, strict=True)):
+            h = torch.baddbmm(bias, h if layer == 0 else h.relu(), weight)
+        logs = torch.log_softmax(h, -1).gather(-1, actions).squeeze(-1)
+        optimiser.zero_grad()
+        (-(logs * v).sum() / n).backward()
+        optimiser.step()
+        return n_networks * n
+
+    return update
+
+
+def compiled_update(n_networks: int, n: int) -> Callable[[], int]:
+    """The same with the compiled networks, one after the other."""
+    rng = np.random.default_rng(0)
+    policy = make_policy(policies.Categorical(), (10, 20), 6, 3, 0)
+    stack = [
+        policies.initial_parameters(policy, policies.Categorical(), rng) for _ in range(n_networks)
+    ]
+    moments = np.zeros((n_networks, 2, stack[0].size), np.float32)
+    gradient = np.empty_like(stack[0])
+    units, deltas = np.empty((2, policy.sizes.sum(), networks.padded(n)), np.float32)
+    states = rng.normal(size=(n, 6)).astype(np.float32)
+    actions = rng.integers(3, size=(n, 1)).astype(np.float32)
+    v = rng.normal(size=n).astype(np.float32) / n
+
+    def update() -> int:
+        for parameters, (first, second) in zip(stack, moments, strict=True):
+            policies.likelihood_gradient(
+                policy, parameters, states, actions, v, units, deltas, gradient
+            )
+            networks.adam_step(parameters, gradient, first, second, 1, 1e-3)
+        return n_networks * n
+
+    return update
+
+
+@contextmanager
+def one_torch_thread() -> Iterator[None]:
+    """Torch with one thread, and as it was afterwards."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+def best_of(ways: dict[str, Callable[[int], int]], rounds: int) -> dict[str, float]:
+    """Compile, then let the ways take turns; the fastest round of each counts."""
+    best = dict.fromkeys(ways, np.inf)
+    for way in ways.values():
+        way(99)
+    for seed in range(rounds):
+        for name, way in ways.items():
+            best[name] = min(best[name], microseconds(lambda way=way, seed=seed: way(seed)))
+    return best
+
+
+def row(benchmark: str, rival: float, mine: float, note: str, unit: str = UNIT) -> dict:
+    """One comparison."""
+    return {
+        "benchmark": benchmark,
+        "rival": round(rival, 3),
+        "ours": round(mine, 4),
+        "ratio": round(rival / mine, 1),
+        "unit": unit,
+        "note": note,
+    }
+
+
+def training_rows() -> Iterator[dict]:
+    """Whole training, learning included."""
+    beginning = (
+        f"learning included, one core; first {BEGINNING['episodes']} episodes of a seed or "
+        f"{BEGINNING['max_env_steps']:,} steps, both"
+    )
+    for name in CONFIGS:
+        ways = {
+            "usual": lambda seed, name=name: usual_loop(name, seed),
+            "ours": lambda _, name=name: ours(name),
+        }
+        if name == "Acrobot-v1":
+            ways["a2c"] = lambda seed, name=name: a2c(name, seed)
+        best = best_of(ways, ROUNDS)
+        note = f"usual loop: Gymnasium and torch, one network; ours: 30 seeds; {beginning}"
+        if name != "MountainCarContinuous-v0":
+            note += f"; {where_time_goes(name)}"
+        yield row(f"REINFORCE on {name}", best["usual"], best["ours"], note)
+        if name == "Acrobot-v1":
+            note = (
+                f"Stable-Baselines3 A2C, 16 environments, 20,000 steps; ours: 30 seeds; {beginning}"
+            )
+            yield row(f"REINFORCE on {name}", best["a2c"], best["ours"], note)
+
+
+def learner_rows() -> Iterator[dict]:
+    """The learner alone: why the networks are compiled and not stacked in torch."""
+    for n_networks, n in ((1, 150), (30, 150), (30, 512)):
+        updates = {"torch": stacked_update(n_networks, n), "ours": compiled_update(n_networks, n)}
+        ways = {name: lambda _, update=update: update() for name, update in updates.items()}
+        best = best_of(ways, 100)
+        yield row(
+            f"one update of {n_networks} network(s), minibatch {n}",
+            best["torch"],
+            best["ours"],
+            "torch: stacked with baddbmm, autograd, fused Adam, one thread; widths 6-10-20-3",
+            "microseconds a sample",
+        )
+
+
+def rows() -> list[dict]:
+    """Measure everything."""
+    with one_torch_thread():
+        return [*training_rows(), *learner_rows()]
+
+
+if __name__ == "__main__":
+    for measured in rows():
+        print(measured)
