@@ -31,6 +31,7 @@ ACROBOT_CAP = 5_000  # steps an episode, as in 2018, when a capped episode was n
 WINDOW = 100  # episodes; "steps at episode k" is a seed's median over the last 100 up to k
 LEARNED = 500  # steps; a seed that learned needs at most so many in the last 100 episodes
 MILESTONES = (1_000, 1_500, 2_000)
+REPORTED_AT = {"Acrobot": 1_000, "MountainCar": 1_500}  # the episodes of the report's numbers
 
 ENVIRONMENTS = {
     "Acrobot": ("Acrobot-v1", {"max_episode_steps": ACROBOT_CAP, "learn_from_capped": False}),

@@ -1,0 +1,119 @@
+"""Chapter 3: learning curves over those of 2018, and films of the agent before and after."""
+
+from collections.abc import Mapping
+
+import gymnasium as gym
+import numpy as np
+import pandas as pd
+from matplotlib import font_manager
+from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
+from PIL import Image, ImageDraw, ImageFont
+from reinforce_study import EPISODES, Curves
+
+from rl_core.figures import BLACK, BLUE, COLOURS, GREY, LINES, Film, label
+from rl_core.rollouts import Rollout
+from rl_core.statistics import bootstrap_interval
+
+EVERY = 10  # episodes between drawn points
+LIMIT = {"Acrobot": 500, "MountainCar": 200}  # Gymnasium's own time limits, for orientation
+
+
+def learning_curve(curves: Curves, arm: str, original: pd.DataFrame) -> Figure:
+    """Steps an episode of every seed, their median with its interval, and the curve of 2018."""
+    figure, axes = plt.subplots(figsize=(6.4, 4.4))
+    axes.fill_between(
+        *(original["episode"], original["low"], original["high"]),
+        color="#c9b458",
+        alpha=0.75,
+        lw=0,
+        label="2018 original, one run",
+    )
+    x = np.arange(EVERY, EPISODES + 1, EVERY)
+    seeds = curves.smooth[arm][:, x - 1]
+    learned = curves.learned(arm)
+    for steps, good in zip(seeds, learned, strict=True):
+        axes.plot(x, steps, color=GREY if good else BLACK, ls="-" if good else ":", lw=0.6)
+        stop = np.flatnonzero(np.isfinite(steps))[-1:]
+        if not good and len(stop) and stop[0] + 1 < len(x):
+            axes.plot(x[stop], steps[stop], "x", color=BLACK, ms=5)
+    axes.plot([], [], color=GREY, ls="-", lw=0.8, label=f"{learned.sum()} seeds that learned")
+    if not learned.all():
+        text = f"{(~learned).sum()} that did not (× out of budget)"
+        axes.plot([], [], color=BLACK, ls=":", lw=0.8, label=text)
+    _median(axes, x, seeds, BLUE, "-", "median of all 30 seeds, 95% interval")
+    axes.set_yscale("log")
+    label(axes, x="episode", y="steps to the goal (log scale)")
+    axes.legend(fontsize=9)
+    plt.close(figure)
+    return figure
+
+
+def variants(curves: Curves, name: str, names: Mapping[str, str]) -> Figure:
+    """Median and interval of each variant on one environment; its share of seeds that learned."""
+    figure, axes = plt.subplots(figsize=(6.4, 4.4))
+    x = np.arange(EVERY, EPISODES + 1, EVERY)
+    for i, (variant, text) in enumerate(names.items()):
+        arm = f"{name}, {variant}"
+        share = f"{text} ({curves.learned(arm).sum()} of 30 learned)"
+        _median(axes, x, curves.smooth[arm][:, x - 1], COLOURS[i], LINES[i], share)
+    axes.axhline(LIMIT[name], color=GREY, lw=0.8, ls="-")
+    note = f"Gymnasium's time limit, {LIMIT[name]}"
+    axes.text(0, LIMIT[name], note, ha="left", va="bottom", fontsize=8)
+    axes.set_yscale("log")
+    label(axes, x="episode", y="steps to the goal (log scale)")
+    figure.legend(loc="outside lower center", ncols=2, fontsize=9)
+    plt.close(figure)
+    return figure
+
+
+def _median(axes, x, seeds, colour, line, text) -> None:
+    """Median over seeds; a seed that stopped counts as needing for ever."""
+    values = np.where(np.isnan(seeds), np.inf, seeds)
+    rng = np.random.default_rng(np.random.SeedSequence(2020))
+    middle, low, high = bootstrap_interval(values, rng=rng, resamples=2_000)
+    top = np.nanmax(seeds)
+    axes.fill_between(
+        x,
+        low,
+        np.where(np.isinf(high), top, high),
+        where=np.isfinite(low),
+        color=colour,
+        alpha=0.22,
+        lw=0,
+    )
+    axes.plot(x, np.where(np.isinf(middle), np.nan, middle), color=colour, ls=line, label=text)
+
+
+def before_and_after(env_id: str, before: Rollout, after: Rollout, description: str) -> Film:
+    """Two episodes side by side: with the initial weights and with the trained ones."""
+    left, right = (_frames(env_id, episode) for episode in (before, after))
+    length = max(len(left), len(right))
+    pictures = []
+    for t in range(0, length + 20, 2):
+        halves = [
+            _titled(frames[min(t, len(frames) - 1)], f"{title}: step {min(t, len(frames) - 1)}")
+            for frames, title in ((left, "before"), (right, "after"))
+        ]
+        pictures.append(np.concatenate(halves, axis=1))
+    return Film(pictures, frames_per_second=15, description=description)
+
+
+def _frames(env_id: str, episode: Rollout) -> list[np.ndarray]:
+    """Play the episode's actions again in Gymnasium, at half size."""
+    env = gym.make(env_id, render_mode="rgb_array", max_episode_steps=-1)
+    env.reset(seed=episode.environment_seed)
+    frames = [env.render()[::2, ::2]]
+    for action in episode.actions[:, 0]:
+        env.step(int(action))
+        frames.append(env.render()[::2, ::2])
+    env.close()
+    return frames
+
+
+def _titled(frame: np.ndarray, title: str) -> np.ndarray:
+    font = ImageFont.truetype(font_manager.findfont("DejaVu Sans"), 14)
+    picture = Image.new("RGB", (frame.shape[1], frame.shape[0] + 24), "white")
+    picture.paste(Image.fromarray(np.ascontiguousarray(frame)), (0, 24))
+    ImageDraw.Draw(picture).text((6, 3), title, font=font, fill="black")
+    return np.asarray(picture)
