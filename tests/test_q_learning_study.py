@@ -1,14 +1,8 @@
 """Chapter 2's predictions against simulation, its measures against hand calculations."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "book"))
-
 import q_learning_study as study
 from q_learning_world import GAMMA, World, faulty_weights
 
