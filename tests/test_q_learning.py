@@ -249,6 +249,20 @@ class Shifted(gym.Env):
         return self.s, self.rewards[action - 7], self.s == 12, False, {}
 
 
+class RoundTrip(Shifted):
+    """Ends where it began: 10, 11, and 10 again, which pays and terminates."""
+
+    def step(self, action):  # noqa: D102
+        self.s = 21 - self.s
+        return self.s, float(self.s == 10), self.s == 10, False, {}
+
+
+def test_nothing_is_expected_after_the_end_even_of_a_state_that_has_a_value():
+    config = QLearningConfig(gamma=0.5, step_size=1.0, exploration=EpsilonGreedy(1.0))
+    run = q_learning(RoundTrip, config, episodes=60, seeds=[0])
+    np.testing.assert_array_equal(run.arrays["Q"][0], [[0.5, 0.5], [1.0, 1.0], [0.0, 0.0]])
+
+
 def test_spaces_need_not_count_from_zero():
     config = QLearningConfig(gamma=0.5, step_size=1.0, exploration=EpsilonGreedy(1.0))
     run = q_learning(
