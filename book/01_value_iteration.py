@@ -339,7 +339,6 @@ figures.captioned(verdicts(findings), "Table 1.3. The report's claims about plan
 figures.captioned(
     details(findings),
     "Table 1.4. Each criterion with its evidence. Seeds: number of random mazes; 0 where nothing is random.",
-    formats=dict.fromkeys(["estimate", "low", "high"], "{:.3g}"),
 )
 
 # %% [markdown]

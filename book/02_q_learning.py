@@ -35,7 +35,7 @@ from myst_nb import glue
 from q_learning_world import World, faulty_weights
 
 from rl_core import figures
-from rl_core.claims import record
+from rl_core.claims import details, record, verdicts
 from rl_core.experiments import run
 
 figures.use_style()
@@ -436,12 +436,12 @@ drawings.courses(
 found.to_csv(RESULTS / "q_learning_arms.csv", index=False)
 findings = study.findings(world, found, study.levels(world, norms))
 record(findings, RESULTS, chapter="2")
-verdicts = study.verdicts(findings)
+verdicts = verdicts(findings)
 figures.captioned(verdicts, "Table 2.4. The report's claims about Q-learning.")
 
 # %% tags=["hide-input"]
 figures.captioned(
-    study.evidence_table(findings),
+    details(findings),
     "Table 2.5. Each criterion with its evidence: the median of 30 seeds and its 95% interval. "
     "Evenness is the exponential of the visits' entropy, as a share of the entries.",
 )

@@ -247,7 +247,6 @@ figures.captioned(verdicts(findings), "Table 3.3. The report's claims about REIN
 figures.captioned(
     details(findings),
     "Table 3.4. Each criterion with its evidence.",
-    formats=dict.fromkeys(["estimate", "low", "high"], "{:.3g}"),
 )
 
 # %% [markdown]

@@ -9,7 +9,7 @@ import pandas as pd
 from q_learning_world import GAMMA, World
 
 from rl_core.arm import Arm
-from rl_core.claims import Claim, Criterion, Evidence, Finding, details
+from rl_core.claims import Claim, Criterion, Evidence, Finding
 from rl_core.experiments import Results
 from rl_core.exploration import EpsilonGreedy, Linear, Softmax, UnnormalisedSoftmax, VisitDecay
 from rl_core.q_learning import QLearningConfig, q_learning_on_model
@@ -337,19 +337,6 @@ def final_split(parts: dict[str, np.ndarray]) -> pd.DataFrame:
         values = {"squared error": found.estimate, "low": found.low, "high": found.high}
         rows.append({"entries": name, **values, "share (%)": share})
     return pd.DataFrame(rows)
-
-
-def evidence_table(judged: list[Finding]) -> pd.DataFrame:
-    """Each criterion of each claim with what was measured, narrow enough for a phone."""
-    rows = details(judged)
-    measured = [f"{row.estimate:.3g} [{row.low:.3g}, {row.high:.3g}]" for row in rows.itertuples()]
-    return rows.assign(measured=measured)[["id", "criterion", "measured", "met"]]
-
-
-def verdicts(judged: list[Finding]) -> pd.DataFrame:
-    """The findings in short."""
-    rows = pd.DataFrame([finding.row() for finding in judged])
-    return rows[["id", "claim", "verdict", "figure"]]
 
 
 def findings(world: World, found: pd.DataFrame, figure_9: pd.DataFrame) -> list[Finding]:

@@ -178,15 +178,16 @@ def verdicts(findings: Sequence[Finding]) -> pd.DataFrame:
 
 
 def details(findings: Sequence[Finding]) -> pd.DataFrame:
-    """One row for each criterion of each claim: what was asked, what was measured, the answer."""
+    """One row for each criterion of each claim: what was asked, what was measured, the answer.
+
+    The estimate and its interval are one text, so that the table fits on a phone.
+    """
     return pd.DataFrame(
         [
             {
                 "id": finding.claim.id,
                 "criterion": criterion.text,
-                "estimate": evidence.estimate,
-                "low": evidence.low,
-                "high": evidence.high,
+                "measured": f"{evidence.estimate:.3g} [{evidence.low:.3g}, {evidence.high:.3g}]",
                 "seeds": evidence.seeds,
                 "met": answer,
             }

@@ -62,6 +62,7 @@ def test_the_table_gathers_the_chapters_in_order(tmp_path):
     assert table.loc[1, ["estimate", "low", "high", "seeds"]].tolist() == [4, 3, 5, 30]
     assert rows["verdict"].tolist() == ["holds"]
     assert details([first])["met"].tolist() == ["yes", "yes"]
+    assert details([second])["measured"].tolist() == ["4 [3, 5]"]
     assert verdicts([first, second])["verdict"].tolist() == ["holds", "holds"]
 
 
