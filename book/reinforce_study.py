@@ -254,3 +254,10 @@ def findings(curves: Curves) -> list[Finding]:
 
 def _evidence(values: np.ndarray, rng: np.random.Generator) -> Evidence:
     return Evidence(*bootstrap_interval(values, rng=rng), seeds=len(values))
+
+
+def seeds_to_tell(evidence: Evidence, bound: float) -> int:
+    """Seeds at which the interval, shrinking with their root, would no longer hold the bound."""
+    half = (evidence.high - evidence.low) / 2
+    seeds = evidence.seeds * (half / abs(evidence.estimate - bound)) ** 2
+    return int(np.ceil(seeds / 10) * 10)
