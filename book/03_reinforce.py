@@ -190,12 +190,11 @@ def film(name, env_id, text):
     arm = f"{name}, as reported"
     config = next(a.config for a in study.arms() if a.name == arm)
     seed, arrays = study.median_seed(curves, arm), results.arrays(arm)
-    episodes = [
-        rollout(env_id, config, weights_of(arrays, seed, moment), np.random.default_rng(7), 250)
-        for moment in ("initial/", "")
-    ]
+    trained, untrained = (weights_of(arrays, seed, moment) for moment in ("", "initial/"))
+    after = rollout(env_id, config, trained, np.random.default_rng(0), 1_000)
+    before = rollout(env_id, config, untrained, np.random.default_rng(0), len(after.rewards))
     glue(f"{name}-seed", seed, display=False)
-    return drawings.before_and_after(env_id, *episodes, description=text)
+    return drawings.before_and_after(env_id, before, after, description=text)
 
 
 film(
@@ -206,7 +205,7 @@ film(
 
 # %% [markdown]
 # :::{container} caption
-# **Film S3.1.** Acrobot before learning (left, the first 250 steps) and after (right). The seed is number
+# **Film S3.1.** Acrobot before learning (left) and after (right), for as long as the trained agent needs. The seed is number
 # {glue:text}`Acrobot-seed`, the one in the middle when all 30 are ordered by their steps at the end.
 # :::
 
@@ -219,7 +218,7 @@ film(
 
 # %% [markdown]
 # :::{container} caption
-# **Film S3.2.** MountainCar before learning (left, the first 250 steps) and after (right), seed {glue:text}`MountainCar-seed`,
+# **Film S3.2.** MountainCar before learning (left) and after (right), seed {glue:text}`MountainCar-seed`,
 # again the one in the middle.
 # :::
 #

@@ -90,7 +90,7 @@ def before_and_after(env_id: str, before: Rollout, after: Rollout, description: 
     left, right = (_frames(env_id, episode) for episode in (before, after))
     length = max(len(left), len(right))
     pictures = []
-    for t in range(0, length + 20, 2):
+    for t in range(0, length + 30, 3):
         halves = [
             _titled(frames[min(t, len(frames) - 1)], f"{title}: step {min(t, len(frames) - 1)}")
             for frames, title in ((left, "before"), (right, "after"))
@@ -103,12 +103,12 @@ def _frames(env_id: str, episode: Rollout) -> list[np.ndarray]:
     """Play the episode's actions again in Gymnasium, at half size."""
     env = gym.make(env_id, render_mode="rgb_array", max_episode_steps=-1)
     env.reset(seed=episode.environment_seed)
-    frames = [env.render()[::2, ::2]]
+    pictures = [env.render()]
     for action in episode.actions[:, 0]:
         env.step(int(action))
-        frames.append(env.render()[::2, ::2])
+        pictures.append(env.render())
     env.close()
-    return frames
+    return [np.asarray(Image.fromarray(picture).reduce(2)) for picture in pictures]
 
 
 def _titled(frame: np.ndarray, title: str) -> np.ndarray:
