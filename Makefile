@@ -59,7 +59,7 @@ pairing: .venv/.installed ## each notebook says the same as its .py twin and hol
 	$(BIN)/pytest tests/pairing.py
 
 notebooks: .venv/.installed ## every notebook at full scale (nbmake)
-	$(BIN)/pytest --nbmake --nbmake-timeout=5400 $(NOTEBOOKS)
+	$(BIN)/pytest --nbmake --nbmake-timeout=5400 -o faulthandler_timeout=0 $(NOTEBOOKS)
 
 sync: .venv/.installed ## write the .ipynb twins anew from the .py files
 	$(BIN)/jupytext --update --to ipynb book/[0-9]*.py

@@ -504,7 +504,8 @@ def test_killed_at_random_moments_and_resumed(
     """Twenty kills together, each of the whole process group."""
     program = (TESTS / "toy_experiment.py", learner)
     moments = random.Random(workers)
-    store, stored = Store(tmp_path / "store 0"), 0
+    fresh = (Store(tmp_path / f"store {number}") for number in range(20 * kills))
+    store, stored = next(fresh), 0
     counts = []  # results in the store after each kill
     while len(counts) < kills:
         before = set(store.path.glob("scratch/*/*.json"))
@@ -514,8 +515,9 @@ def test_killed_at_random_moments_and_resumed(
             finished = not wait_for_work(process, store, before)
             if finished or select.select([process.stdout], [], [], moment)[0]:
                 assert process.stdout.readline().strip() == uninterrupted[learner]
-                # It was quicker than the kill: the next one starts from an empty store.
-                store, stored = Store(tmp_path / f"store {len(counts)}"), 0
+                # It was quicker than the kill: the next one starts from an empty store. (In one
+                # that has everything there would be no work to kill, for ever.)
+                store, stored = next(fresh), 0
                 continue
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
