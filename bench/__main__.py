@@ -9,6 +9,7 @@ import os
 import platform
 import subprocess
 import sys
+from datetime import date
 from pathlib import Path
 
 import pandas as pd
@@ -40,7 +41,10 @@ def measure(module: str) -> list[dict]:
 
 
 def main(modules: list[str]) -> None:
-    """Measure, print the table as Markdown, keep it as `results/bench.csv`."""
+    """Measure, print the table as Markdown, keep it as `results/bench.csv`.
+
+    What the book shows is `book/data/bench.csv`: copy a measurement of all modules there.
+    """
     unknown = sorted(set(modules) - set(MODULES))
     if unknown:
         raise SystemExit(f"unknown: {', '.join(unknown)}; allowed: {', '.join(MODULES)}")
@@ -48,12 +52,13 @@ def main(modules: list[str]) -> None:
     for module in modules or MODULES:
         print(f"measuring {module} ...", file=sys.stderr, flush=True)
         gathered += measure(module)
-    table = pd.DataFrame(gathered)
+    table = pd.DataFrame(gathered).assign(machine=machine(), date=f"{date.today()}")
     RESULTS.mkdir(exist_ok=True)
     table.to_csv(RESULTS / "bench.csv", index=False)
     print(f"Measured on: {machine()}\n")
-    head = list(table.columns)
-    lines = [head, ["---"] * len(head), *table.astype(str).to_numpy().tolist()]
+    shown = table.drop(columns=["machine", "date"])
+    head = list(shown.columns)
+    lines = [head, ["---"] * len(head), *shown.astype(str).to_numpy().tolist()]
     print("\n".join(f"| {' | '.join(line)} |" for line in lines))
 
 

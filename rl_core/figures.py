@@ -1,7 +1,6 @@
 """What the drawings of all chapters share: one look, one set of colours, one way to show a film."""
 
 import base64
-import hashlib
 import html
 import subprocess
 import tempfile
@@ -87,12 +86,14 @@ def captioned(
 ) -> Styler:
     """Show a table with a caption and without its row numbers; words are set to the left.
 
+    Its address on the page is that of its number: `#T_table-3-1` for "Table 3.1. Steps ...".
+
     Parameters
     ----------
     table : pandas.DataFrame
         What to show.
     caption : str
-        The caption, with the table's number.
+        The caption, beginning with the table's number and a full stop.
     formats : mapping of str to str, optional
         A format for a column's numbers, such as "{:.2f}".
     boldest : sequence of str
@@ -105,8 +106,9 @@ def captioned(
     >>> "Table 0. Numbers." in page, "4.5" in page, "0.123" in page
     (True, True, False)
     """
-    # A fixed id: the same table gives the same page.
-    styled = table.style.set_uuid(hashlib.sha256(caption.encode()).hexdigest()[:8])
+    # A fixed id: the same table gives the same page, and links can lead to it.
+    number = caption.partition(". ")[0].rstrip(".")
+    styled = table.style.set_uuid(number.lower().replace(" ", "-").replace(".", "-"))
     styled = styled.set_caption(caption).hide(axis="index").format(dict(formats or {}))
     words = [i for i, kind in enumerate(table.dtypes) if not pd.api.types.is_numeric_dtype(kind)]
     left = [CSSDict(selector=f".col{i}", props="text-align: left") for i in words]

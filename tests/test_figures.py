@@ -73,3 +73,8 @@ def test_the_largest_of_a_row_is_bold_and_ties_both_are():
 def test_the_same_table_gives_the_same_page():
     table = pd.DataFrame({"a": [1.0]})
     assert captioned(table, "Table 0.").to_html() == captioned(table, "Table 0.").to_html()
+
+
+def test_a_table_has_an_address():
+    page = captioned(pd.DataFrame({"a": [1.0]}), "Table 3.1. Steps. All of them.").to_html()
+    assert '<table id="T_table-3-1">' in page

@@ -1,0 +1,89 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#     notebook_metadata_filter: kernelspec,jupytext,mystnb
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#       format_version: '1.3'
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # How to reproduce it
+#
+# ```
+# git clone <this repository>
+# make book            # sets up .venv, runs everything, builds the site
+# make test            # style, types, tests, every notebook at full scale, the built site in a browser
+# make book SEEDS=3    # a first look in a few minutes, marked as a preview
+# make bench           # speed beside other libraries
+# make pdf             # the book as one file
+# ```
+#
+# Python 3.11, make and git are all it needs; a browser (Chromium) is used for the last step of `make test` and for `make pdf`. Once
+# installed, nothing needs a network.
+#
+# ## Randomness
+#
+# A run is a pure function of environment, configuration, number of episodes and seed. From one `numpy.random.SeedSequence(seed)` four
+# independent streams are spawned: for the environment, for the actions, for the network (initial weights, order of the samples) and for the replay
+# memory. No global random state is read or changed. The same seed gives the same bits alone or among others, on one worker or
+# several, in one go or after having been killed; tests hold this to the bit. Published are the seeds 0 to 29. Whatever had to be chosen, such as
+# caps and budgets, was chosen on seeds from 1000 on.
+#
+# ## Versions
+
+# %% tags=["hide-input"]
+from pathlib import Path
+
+import provenance
+
+from rl_core import figures
+
+RESULTS = Path("../results")
+made = provenance.read(RESULTS)
+figures.captioned(
+    provenance.versions(made), "Table A.1. What the results were made with, as stored beside them."
+)
+
+# %% [markdown]
+# All packages, with exact versions, are in `environment.txt`. Another version of any of the libraries in the table means another digest: results are
+# then made again, not read.
+#
+# ## Where every result comes from
+#
+# Results are kept in `results/store`, each under a digest (SHA-256) of all that decides it: configuration, seed, episodes, the source code of the modules involved and
+# the versions of the libraries. Beside each one lies a record of the same, with the processor and the time it took.
+
+# %% tags=["hide-input"]
+provenance.by_arm(made).to_csv(RESULTS / "provenance.csv", index=False)
+figures.captioned(
+    provenance.by_arm(made).drop(columns=["config", "algorithm"]),
+    "Table A.2. The arms of all chapters. Seconds of one core, all seeds together; the beginning of the digest of the first seed.",
+    formats={"seconds": "{:.1f}"},
+)
+
+# %% [markdown]
+# With configurations: {download}`provenance.csv <../results/provenance.csv>`.
+#
+# ## What differs from 2018, and why
+#
+# | 2018 | here | why |
+# |---|---|---|
+# | one run a curve | 30 seeds, intervals, failures counted | one run shows what can happen, not what does |
+# | OpenAI gym of 2018 | Gymnasium; for Acrobot, MountainCar and MountainCarContinuous compiled twins | the twins are tested against Gymnasium step by step, to the bit |
+# | TensorFlow 1.5 | networks and optimisers compiled with numba, tested against PyTorch | speed; Adam and RMSProp keep TensorFlow's constants and the place of their epsilon |
+# | no time limits; capped episodes thrown away or left out of the curves | no time limits; capped episodes stay in the tables, and are learned from or not as stated | a curve without its failures says too much |
+# | no budget | a budget of environment steps a seed, stated in each chapter, exhausted ones counted | a hopeless run would not end |
+# | ε is the probability of exploiting | in code the standard ε, in the text *exploitation probability* | one word for one thing |
+# | "RMSE" is a Frobenius norm; "iterations" are episodes | called what they are | |
+# | "softmax" divided exp(Q) by the sum of Q | a softmax; the faulty formula as an arm of its own in chapter 2 | the report's remarks are about something else |
+# | transitions without a terminal flag in the DQN | both, as arms of chapter 4 | it decides what can be learned |
+# | batch 512 (report) or 32 (program) in the DQN | 512 for the report's figures | the text is what is reproduced |
+# | "3 features" of MountainCarContinuous | two readings, as arms of chapter 5 | the environment has two observations |
+# | curves not smoothed | seeds drawn as medians over a window, as stated in each caption | thirty unsmoothed curves cannot be read |

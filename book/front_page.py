@@ -1,0 +1,262 @@
+"""The front page: all claims in one table, the report's figures beside ours, what it took.
+
+Nothing here is typed by hand: the verdicts come from `results/claims.csv`, the curves from the data
+of the chapters' figures, the times from the provenance of the results.
+"""
+
+import base64
+import html
+import io
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
+
+from rl_core.figures import BLUE
+
+VERDICTS = {  # in the order of the page: what failed stands first
+    "does not hold": "The evidence is against it.",
+    "holds in part": "One half of it is borne out, another is not.",
+    "cannot tell": "The interval holds the bound: more seeds would be needed.",
+    "holds": "Every criterion is met by the whole of its interval.",
+}
+PAGES = {
+    1: "01_value_iteration",
+    2: "02_q_learning",
+    3: "03_reinforce",
+    4: "04_dqn",
+    5: "05_continuous_reinforce",
+    6: "06_evaluation",
+}
+REPORT_FIGURES = {  # number: chapter, title, file of the published curve, unit, logarithmic
+    9: (2, "Q-learning on the Maze", "figure_09_q_learning_rmse", "‖Q − Q*‖", False),
+    10: (3, "Acrobot, REINFORCE", "figure_10_acrobot_reinforce", "steps", True),
+    11: (3, "MountainCar, REINFORCE", "figure_11_mountaincar_reinforce", "steps", True),
+    12: (4, "Acrobot, DQN", "figure_12_acrobot_dqn", "steps", True),
+    13: (4, "MountainCar, DQN", "figure_13_mountaincar_dqn", "steps", True),
+    14: (
+        5,
+        "MountainCarContinuous, REINFORCE",
+        "figure_14_mountaincarcontinuous_reinforce",
+        "steps",
+        True,
+    ),
+}
+
+
+class IncompleteError(RuntimeError):
+    """The results do not have every claim exactly once."""
+
+
+def claims(results: Path, expected: pd.DataFrame) -> pd.DataFrame:
+    """Read the table of claims and check it against the list of what the report claims.
+
+    Parameters
+    ----------
+    results : Path
+        Folder with `claims.csv`, which the chapters write.
+    expected : pandas.DataFrame
+        The claims of the report, with the column `id`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row a claim, in the order of `expected`.
+
+    Raises
+    ------
+    IncompleteError
+        If a claim is missing, there twice, or unknown.
+    """
+    path = results / "claims.csv"
+    found = pd.read_csv(path, dtype={"id": str, "section": str}) if path.exists() else expected[:0]
+    counts = found["id"].value_counts()
+    wrong = {
+        "missing": sorted(set(expected["id"]) - set(counts.index)),
+        "more than once": sorted(counts.index[counts > 1]),
+        "unknown": sorted(set(counts.index) - set(expected["id"])),
+    }
+    if any(wrong.values()):
+        what = "; ".join(f"{name}: {', '.join(ids)}" for name, ids in wrong.items() if ids)
+        raise IncompleteError(f"{path.name} is not the whole table ({what}): run all chapters")
+    return found.set_index("id").loc[expected["id"]].reset_index()
+
+
+def counts(table: pd.DataFrame) -> dict[str, int]:
+    """How many claims got each verdict, in the order of the page."""
+    return {verdict: int((table["verdict"] == verdict).sum()) for verdict in VERDICTS}
+
+
+def anchor(label: str) -> str:
+    """Return the address, from the front page, of a figure or table of a chapter.
+
+    Examples
+    --------
+    >>> anchor("Figure 10")
+    '03_reinforce.html#figure-10'
+    >>> anchor("Figure S2.1"), anchor("Table 4.2")
+    ('02_q_learning.html#figure-s2-1', '04_dqn.html#T_table-4-2')
+    """
+    kind, number = label.split()
+    if number.isdecimal():
+        chapter = 1 if int(number) < 9 else REPORT_FIGURES[int(number)][0]
+    else:
+        chapter = int(re.findall(r"\d+", number)[0])
+    name = f"{kind}-{number}".lower().replace(".", "-")
+    return f"{PAGES[chapter]}.html#{'T_' if kind == 'Table' else ''}{name}"
+
+
+def linked(text: str) -> str:
+    """Turn the names of figures and tables in a text into links.
+
+    Examples
+    --------
+    >>> linked("Figure 9")
+    '<a href="02_q_learning.html#figure-9">Figure 9</a>'
+    """
+    kind = "Figure"
+
+    def link(match: re.Match) -> str:
+        nonlocal kind
+        word, number = match[1], match[2]
+        if word:
+            kind = word.strip().rstrip("s")
+        elif number.startswith("S"):
+            kind = "Figure"
+        return f'<a href="{anchor(f"{kind} {number}")}">{match[0]}</a>'
+
+    return re.sub(r"((?:Figure|Table|Film)s? )?(S?\d+(?:\.\d+)?)", link, html.escape(text))
+
+
+def _measured(row: pd.Series) -> str:
+    estimate, low, high = (_number(row[name]) for name in ("estimate", "low", "high"))
+    interval = "" if row["low"] == row["high"] else f" <small>[{low}, {high}]</small>"
+    return f"<b>{estimate}</b>{interval}"
+
+
+def _number(value: float) -> str:
+    if np.isinf(value):
+        return "∞"
+    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
+
+
+def _row(row: pd.Series) -> str:
+    first, *others = row["criterion"].split("; ")
+    more = "".join(f"<li>{html.escape(other)}</li>" for other in others)
+    rest = f"<details><summary>and {len(others)} more</summary><ul>{more}</ul></details>"
+    verdict = row["verdict"]
+    seeds = "exact" if row["seeds"] == 0 else f"{row['seeds']}"
+    cells = {
+        "id": f'<a href="{PAGES[chapter_of(row)]}.html#verdicts">{row["id"]}</a>',
+        "claim of 2018": html.escape(row["claim"]),
+        "verdict": f'<span class="verdict {verdict.replace(" ", "-")}">{verdict}</span>',
+        "measured": _measured(row),
+        "what was measured": html.escape(first) + (rest if others else ""),
+        "seeds": seeds,
+        "see": linked(row["figure"]),
+    }
+    return "<tr>" + "".join(f'<td data-label="{k}">{v}</td>' for k, v in cells.items()) + "</tr>"
+
+
+def chapter_of(row: pd.Series) -> int:
+    """The chapter that judges a claim: that of the figure or table it points to."""
+    target = re.search(r"(?:Figure|Table|Film)s? S?\d+(?:\.\d+)?", row["figure"])
+    page = anchor(target[0].replace("s ", " ")).partition(".")[0]
+    return next(chapter for chapter, name in PAGES.items() if name == page)
+
+
+def claims_table(table: pd.DataFrame) -> str:
+    """The claims as HTML: grouped by verdict, what failed first; a click on a heading sorts."""
+    order = {verdict: place for place, verdict in enumerate(VERDICTS)}
+    grouped = table.sort_values("verdict", key=lambda column: column.map(order), kind="stable")
+    names = ["id", "claim of 2018", "verdict", "measured", "what was measured", "seeds", "see"]
+    head = "".join(f'<th scope="col"><button type="button">{name}</button></th>' for name in names)
+    body = "\n".join(_row(row) for _, row in grouped.iterrows())
+    return (
+        '<table class="claims sortable"><caption>Every claim of the report, with its verdict. '
+        "Measured: the first quantity of its criterion and the 95% interval. A click on a heading "
+        f"sorts.</caption><thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table>"
+    )
+
+
+def verdict_bar(table: pd.DataFrame) -> str:
+    """The verdicts as one bar of HTML, each part as wide as its share of the claims."""
+    parts = "".join(
+        f'<span class="verdict {verdict.replace(" ", "-")}" style="flex-grow:{count}" '
+        f'title="{VERDICTS[verdict]}"><b>{count}</b> {verdict}</span>'
+        for verdict, count in counts(table).items()
+        if count
+    )
+    return f'<div class="verdict-bar" role="img" aria-label="{_spoken(table)}">{parts}</div>'
+
+
+def _spoken(table: pd.DataFrame) -> str:
+    return ", ".join(f"{count} {verdict}" for verdict, count in counts(table).items())
+
+
+def _thumbnail(number: int, now: pd.DataFrame, original: pd.DataFrame) -> Figure:
+    """The curve of 2018 on the left, ours on the right, on the same axes."""
+    *_, unit, logarithmic = REPORT_FIGURES[number]
+    figure, (left, right) = plt.subplots(1, 2, figsize=(4.4, 1.9), sharex=True, sharey=True)
+    middle = original[["low", "high"]].mean(axis=1)
+    left.fill_between(original["episode"], original["low"], original["high"], color="#9a8423")
+    left.plot(original["episode"], middle, color="#9a8423", lw=0.6)
+    high = now["high"].where(np.isfinite(now["high"]), now.filter(like="seed_").max(axis=1))
+    right.fill_between(now["episode"], now["low"], high, color=BLUE, alpha=0.3, lw=0)
+    right.plot(now["episode"], now["median"], color=BLUE, lw=1.2, ls="-")
+    left.set_title("2018", fontsize=9)
+    right.set_title(f"now, median of {now.filter(like='seed_').shape[1]}", fontsize=9)
+    left.set_ylabel(unit, fontsize=8)
+    for axes in (left, right):
+        axes.tick_params(labelsize=7)
+        axes.set_xlabel("episode", fontsize=8)
+        if logarithmic:
+            axes.set_yscale("log")
+    plt.close(figure)
+    return figure
+
+
+def _picture(figure: Figure) -> str:
+    data = io.BytesIO()
+    figure.savefig(data, format="png", dpi=110)
+    return "data:image/png;base64," + base64.b64encode(data.getvalue()).decode()
+
+
+def _card(number: str, page: str, figure: Figure, title: str, text: str) -> str:
+    return (
+        f'<a class="thumbnail" href="{page}"><img src="{_picture(figure)}" '
+        f'alt="{html.escape(text)}"><span>Figure {number}. {html.escape(title)}</span></a>'
+    )
+
+
+def thumbnails(results: Path, originals: Path, situation: Figure) -> str:
+    """The figures of the report as small pictures that lead to the chapters.
+
+    Parameters
+    ----------
+    results : Path
+        Folder with `figures/figure_09.csv` and so on: `episode, median, low, high, seed_0, ...`.
+    originals : Path
+        Folder with the curves of 2018: `episode, low, high`.
+    situation : matplotlib.figure.Figure
+        What stands for Figures 1 to 8, of which there is no data of 2018.
+    """
+    cards = [
+        _card(
+            "1 to 8",
+            anchor("Figure 1"),
+            situation,
+            "The Maze's optimal values and policy",
+            "Plan of the maze with the optimal value of every cell and an arrow for its action.",
+        )
+    ]
+    for number, (_, title, name, unit, _) in REPORT_FIGURES.items():
+        now = pd.read_csv(results / "figures" / f"figure_{number:02d}.csv")
+        original = pd.read_csv(originals / f"{name}.csv")
+        text = f"{title}: {unit} against the episode, the curve of 2018 beside the median of ours."
+        figure = _thumbnail(number, now, original)
+        cards.append(_card(f"{number}", anchor(f"Figure {number}"), figure, title, text))
+    return f'<div class="thumbnails">{"".join(cards)}</div>'

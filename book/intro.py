@@ -1,0 +1,101 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#     notebook_metadata_filter: kernelspec,jupytext,mystnb
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#       format_version: '1.3'
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # Reinforcement learning, thirty seeds at a time
+#
+# In 2018 a student report in a robotics course (University of Pennsylvania, ESE 650) took four small worlds, a
+# grid maze, Acrobot, MountainCar and MountainCarContinuous, and solved them with the classical
+# methods of reinforcement learning. Each curve in it is one run. Some of its remarks are
+# observations, some are guesses. This book does the same experiments again, in the open: every figure and table is
+# made by the code printed beside it, every curve stands on {glue:text}`seeds` seeds with intervals, the curves of 2018
+# are drawn behind ours, and runs that fail are counted, not dropped.
+#
+# ## What held up
+
+# %% tags=["remove-input"]
+from pathlib import Path
+
+import front_page
+import pandas as pd
+import provenance
+from IPython.display import HTML, display
+from myst_nb import glue
+from seeds import SEEDS
+
+from rl_core import figures, maze_figures
+from rl_core.maze import Maze
+from rl_core.planning import value_iteration
+
+figures.use_style()
+RESULTS = Path("../results")
+claims = front_page.claims(RESULTS, pd.read_csv("data/claims.csv", dtype=str))
+for verdict, count in front_page.counts(claims).items():
+    glue(verdict.replace(" ", "-"), count, display=False)
+glue("claims", len(claims), display=False)
+glue("seeds", len(SEEDS), display=False)
+HTML(front_page.verdict_bar(claims))
+
+# %% [markdown]
+# The report makes {glue:text}`claims` statements that can be checked. Each got a criterion, written down in code before its data was
+# looked at. {glue:text}`holds` hold, {glue:text}`holds-in-part` hold in part,
+# {glue:text}`does-not-hold` do not hold, and of {glue:text}`cannot-tell` our runs cannot tell. What failed stands
+# first. Claims differ in kind: some are theorems, some are numbers that one lucky run produced.
+
+# %% tags=["remove-input"]
+HTML(front_page.claims_table(claims))
+
+# %% [markdown]
+# The table as {download}`claims.csv <../results/claims.csv>`. A claim holds if all its criteria are met by the whole of their 95%
+# intervals, does not hold if all are missed by the whole, holds in part if some are met and others not; otherwise the seeds
+# are too few to tell.
+#
+# ## The report's figures, then and now
+
+# %% tags=["remove-input"]
+maze = Maze()
+situation = maze_figures.situation_figure(
+    maze, value_iteration(maze.model(), gamma=0.9).Q, maze.flag_sets[0]
+)
+display(HTML(front_page.thumbnails(RESULTS, Path("data/original"), situation)))
+
+# %% [markdown]
+# A picture leads to its figure. Vertical scales are logarithmic, except for the Maze. The figures of the Maze are the only ones of which
+# no data of 2018 exists.
+#
+# ## What it took
+
+# %% tags=["remove-input"]
+made = provenance.read(RESULTS)
+processors = " and ".join(sorted(made["processor"].unique()))
+figures.captioned(
+    provenance.by_chapter(made),
+    f"Table 0.1. Experiments of the chapters and their time on one core ({processors}). A run is one seed of one arm.",
+    formats={"one core (min)": "{:.1f}"},
+)
+
+# %% [markdown]
+# Chapter 1 needs no training; chapters 2 to 6 run on two cores, side by side. [How to reproduce it](a1_reproduce.ipynb) says what
+# was run, with which versions, and what differs from 2018. [Performance](a2_performance.ipynb) says why it is that fast.
+#
+# ## How to read it
+#
+# A chapter asks a question, explains the method, shows the evidence and gives a verdict. Nothing is
+# assumed but some probability and a little programming. Symbols are those of Sutton and Barto,
+# *Reinforcement Learning: An Introduction* (second edition, 2018). Cells can be unfolded to see the code. Figures that the
+# report has keep its numbers; ours in addition are called S1.1, S1.2 and so on.
+#
+# ```{tableofcontents}
+# ```

@@ -1,0 +1,91 @@
+"""The front page: every claim exactly once, what failed first, links that lead to the figures."""
+
+import re
+from pathlib import Path
+
+import front_page
+import numpy as np
+import pandas as pd
+import pytest
+
+EXPECTED = pd.DataFrame({"id": ["1a", "2b", "3c"]})
+FOUND = pd.DataFrame(
+    {
+        "id": ["3c", "1a", "2b"],
+        "section": ["3.1", "1.1", "2.1"],
+        "claim": ["c <third>", "a", "b"],
+        "criterion": ["steps at most 225; the same again", "share is 1", "ratio"],
+        "estimate": [314.0, 1.0, 0.5],
+        "low": [250.0, 1.0, 0.25],
+        "high": [np.inf, 1.0, 0.75],
+        "seeds": [30, 0, 30],
+        "verdict": ["does not hold", "holds", "cannot tell"],
+        "figure": ["Figure 11, S3.2", "Figures 1 to 8, Table 1.1", "S2.6"],
+    }
+)
+FOUND.loc[2, "figure"] = "Figure S2.6"
+
+
+def test_the_claims_come_in_the_order_of_the_report(tmp_path):
+    FOUND.to_csv(tmp_path / "claims.csv", index=False)
+    table = front_page.claims(tmp_path, EXPECTED)
+    assert table["id"].tolist() == ["1a", "2b", "3c"]
+    assert table["high"].tolist() == [1.0, 0.75, np.inf]
+
+
+@pytest.mark.parametrize(
+    ("found", "message"),
+    [
+        (FOUND[:2], "missing: 2b"),
+        (pd.concat([FOUND, FOUND[:1]]), "more than once: 3c"),
+        (FOUND.assign(id=["3c", "1a", "9z"]), "missing: 2b; unknown: 9z"),
+    ],
+)
+def test_a_table_that_is_not_whole_is_refused(tmp_path, found, message):
+    found.to_csv(tmp_path / "claims.csv", index=False)
+    with pytest.raises(front_page.IncompleteError, match=message):
+        front_page.claims(tmp_path, EXPECTED)
+
+
+def test_no_table_at_all_is_refused(tmp_path):
+    with pytest.raises(front_page.IncompleteError, match=r"missing: 1a, 2b, 3c.*run all"):
+        front_page.claims(tmp_path, EXPECTED)
+
+
+def test_what_failed_stands_first():
+    page = front_page.claims_table(FOUND)
+    assert re.findall(r'">([123][abc])</a>', page) == ["3c", "2b", "1a"]
+    assert front_page.counts(FOUND) == {
+        "does not hold": 1,
+        "holds in part": 0,
+        "cannot tell": 1,
+        "holds": 1,
+    }
+
+
+def test_a_row_tells_its_interval_and_escapes_its_text():
+    page = front_page.claims_table(FOUND)
+    assert "<b>314</b> <small>[250, ∞]</small>" in page
+    assert "<b>1</b></td>" in page  # exact: no interval
+    assert "c &lt;third&gt;" in page
+    assert "<details><summary>and 1 more</summary><ul><li>the same again</li>" in page
+
+
+@pytest.mark.parametrize(
+    ("text", "targets"),
+    [
+        ("Figure 10", ["03_reinforce#figure-10"]),
+        ("Figures 1 to 8", ["01_value_iteration#figure-1", "01_value_iteration#figure-8"]),
+        ("Table 1.2, S1.2", ["01_value_iteration#T_table-1-2", "01_value_iteration#figure-s1-2"]),
+        ("Figures 12, 13", ["04_dqn#figure-12", "04_dqn#figure-13"]),
+    ],
+)
+def test_figures_are_linked(text, targets):
+    links = re.findall('href="([^"]*)"', front_page.linked(text))
+    assert [link.replace(".html", "") for link in links] == targets
+
+
+def test_every_chapter_has_its_page():
+    book = Path(front_page.__file__).parent
+    notebooks = {path.stem for path in book.glob("[0-9]*.ipynb")}
+    assert notebooks == set(front_page.PAGES.values())
