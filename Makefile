@@ -8,8 +8,20 @@ PYTHON ?= $(firstword $(shell command -v python3.11 python3))
 BIN := .venv/bin
 NOTEBOOKS := $(wildcard book/[0-9]*.ipynb)
 SITE := _build/html
+# The setting the site was built with is part of the stamp's name: a preview is never taken for the book.
+STAMP := $(SITE)/.complete-$(or $(SEEDS),30)-seeds
 BOOK_SOURCES := _config.yml _toc.yml environment.txt $(wildcard book/*.md book/*.py book/_static/*) \
 	$(NOTEBOOKS) $(shell find rl_core book/data -type f -not -path '*/__pycache__/*' 2>/dev/null)
+
+# `make book SEEDS=3` is a first look with fewer seeds; no other target takes the setting.
+unexport SEEDS
+PREVIEW := $(if $(filter-out 30,$(SEEDS)),_build/preview)
+ifneq ($(SEEDS),)
+PROBLEM := $(shell SEEDS='$(SEEDS)' "$(PYTHON)" book/seeds.py 2>&1 | tail -n 1)
+ifneq ($(PROBLEM),)
+$(error $(PROBLEM))
+endif
+endif
 
 # One thread a process: the parallelism is over seeds, and results must not depend on core counts.
 export OMP_NUM_THREADS := 1
@@ -34,13 +46,20 @@ setup: .venv/.installed ## make .venv with the pinned environment and the packag
 	@$(BIN)/pip install --quiet --no-build-isolation --no-deps --editable .
 	@touch $@
 
-book: $(SITE)/.complete ## execute the notebooks and build the site into _build/html
-	@echo "The book is at file://$(CURDIR)/$(SITE)/index.html"
+book: $(STAMP) ## execute the notebooks, build the site into _build/html (first look: make book SEEDS=3)
+	@echo "The $(if $(PREVIEW),preview ($(SEEDS) seeds),book) is at file://$(CURDIR)/$(SITE)/index.html"
 
 # Always from nothing: an incremental build passes over warnings in pages it does not read again.
-$(SITE)/.complete: .venv/.installed $(BOOK_SOURCES)
+# A preview is built from a copy of the sources, so that the tables it writes stay out of results/;
+# what it runs is kept in the one store, where the book finds it again.
+$(STAMP): .venv/.installed $(BOOK_SOURCES)
 	@rm -rf _build
-	$(BIN)/jupyter-book build . --warningiserror --nitpick --keep-going
+ifneq ($(PREVIEW),)
+	@mkdir -p results/store _build/preview/results
+	@cp -r _config.yml _toc.yml book _build/preview
+	@ln -s ../../../results/store _build/preview/results/store
+endif
+	SEEDS=$(SEEDS) $(BIN)/jupyter-book build $(or $(PREVIEW),.) --path-output . --warningiserror --nitpick --keep-going
 	@touch $@
 
 test: lint types unit pairing notebooks ## everything that has to pass: style, types, tests, notebooks
