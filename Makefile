@@ -30,7 +30,7 @@ export SDL_VIDEODRIVER := dummy
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PYDEVD_DISABLE_FILE_VALIDATION := 1
 
-.PHONY: help setup book test lint types unit pairing notebooks sync bench clean
+.PHONY: help setup book pdf test lint types unit pairing notebooks browser sync bench clean
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -62,7 +62,21 @@ endif
 	SEEDS=$(SEEDS) $(BIN)/jupyter-book build $(or $(PREVIEW),.) --path-output . --warningiserror --nitpick --keep-going
 	@touch $@
 
-test: lint types unit pairing notebooks ## everything that has to pass: style, types, tests, notebooks
+pdf: _build/book.pdf ## print the book to one file, _build/book.pdf (needs Chromium)
+	@echo "The printed book is at file://$(CURDIR)/$<"
+
+# The book once more on a single page, from the notebooks as they were executed for the site.
+_build/book.pdf: $(STAMP)
+	@rm -rf _build/print && mkdir -p _build/print
+	@cp -r _toc.yml book _build/print
+	@cp _build/jupyter_execute/book/*.ipynb _build/print/book
+	@sed 's/execute_notebooks: force/execute_notebooks: "off"/' _config.yml > _build/print/_config.yml
+	@ln -s $(if $(PREVIEW),../preview/results,../../results) _build/print/results
+	SEEDS=$(SEEDS) $(BIN)/jupyter-book build _build/print --builder singlehtml --warningiserror --nitpick --keep-going
+	@cp _build/print/_build/singlehtml/book/intro.html _build/print/_build/singlehtml/printed.html
+	$(BIN)/python book/paper.py _build/print/_build/singlehtml/printed.html $@
+
+test: lint types unit pairing notebooks browser ## all that has to pass: style, types, tests, notebooks, pages
 
 lint: .venv/.installed ## style and format (ruff)
 	$(BIN)/ruff check
@@ -79,6 +93,9 @@ pairing: .venv/.installed ## each notebook says the same as its .py twin and hol
 
 notebooks: .venv/.installed ## every notebook at full scale (nbmake)
 	$(BIN)/pytest --nbmake --nbmake-timeout=5400 -o faulthandler_timeout=0 $(NOTEBOOKS)
+
+browser: $(STAMP) ## the built book in a headless Chromium: pictures, mathematics, films, search, phone
+	$(BIN)/pytest tests/browser.py
 
 sync: .venv/.installed ## write the .ipynb twins anew from the .py files
 	$(BIN)/jupytext --update --to ipynb book/[0-9]*.py

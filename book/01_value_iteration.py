@@ -238,7 +238,7 @@ figures.captioned(
 glue("sweeps", len(plan.table), display=False)
 glue("error", float(abs(plan.Q - exact.Q).max()), display=False)
 glue("bound", study.ERROR_BOUND, display=False)
-offer("figure_s1_1", plan.table)
+offer("figure_s1_1", plan.table[["sweep", "residual", "norm"]])
 drawings.convergence(plan.table, gamma=study.GAMMA, threshold=study.THRESHOLD)
 
 # %% [markdown]

@@ -186,10 +186,8 @@ glue("level", level, display=False)
 by_step_size = {x: arm.name for x, arm in study.BY_STEP_SIZE.items()}
 predicted = {x: world.noise(x, study.EXPLOITATION) for x in np.geomspace(0.02, 0.9, 12)}
 left = study.left_over(world, found, by_step_size)
-offer(
-    "figure_s2_2",
-    pd.concat([left, pd.DataFrame({"step_size": predicted, "predicted": predicted.values()})]),
-)
+law = pd.DataFrame(predicted.items(), columns=["step_size", "predicted"])
+offer("figure_s2_2", pd.concat([left, law]))
 drawings.noise_law(left, predicted)
 
 # %% [markdown]
