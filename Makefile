@@ -65,16 +65,11 @@ endif
 pdf: _build/book.pdf ## print the book to one file, _build/book.pdf (needs Chromium)
 	@echo "The printed book is at file://$(CURDIR)/$<"
 
-# The book once more on a single page, from the notebooks as they were executed for the site.
+# The book once more on a single page, from what Sphinx kept of the pages of the site.
 _build/book.pdf: $(STAMP)
-	@rm -rf _build/print && mkdir -p _build/print
-	@cp -r _toc.yml book _build/print
-	@cp _build/jupyter_execute/book/*.ipynb _build/print/book
-	@sed 's/execute_notebooks: force/execute_notebooks: "off"/' _config.yml > _build/print/_config.yml
-	@ln -s $(if $(PREVIEW),../preview/results,../../results) _build/print/results
-	SEEDS=$(SEEDS) $(BIN)/jupyter-book build _build/print --builder singlehtml --warningiserror --nitpick --keep-going
-	@cp _build/print/_build/singlehtml/book/intro.html _build/print/_build/singlehtml/printed.html
-	$(BIN)/python book/paper.py _build/print/_build/singlehtml/printed.html $@
+	SEEDS=$(SEEDS) $(BIN)/jupyter-book build $(or $(PREVIEW),.) --path-output . --builder singlehtml
+	@cp _build/singlehtml/book/intro.html _build/singlehtml/printed.html
+	$(BIN)/python book/paper.py _build/singlehtml/printed.html $@
 
 test: lint types unit pairing notebooks browser ## all that has to pass: style, types, tests, notebooks, pages
 

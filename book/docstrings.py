@@ -20,14 +20,14 @@ NUMPY = napoleon.Config(
 
 
 def as_words(text: str) -> str:
-    r"""Escape what would be markup, except `code` in backticks and **leading words** in stars.
+    r"""Escape what would be markup, except `code` in backticks and *stressed* words.
 
     Examples
     --------
-    >>> print(as_words("**Error.** |Q - Q*| of `x * y` and w_"))
-    **Error.** \|Q - Q\*\| of `x * y` and w\_
+    >>> print(as_words("**The** *error* |Q - Q*| of `x * y` and w_"))
+    **The** *error* \|Q - Q\*\| of `x * y` and w\_
     """
-    parts = re.split(r"(`[^`]*`|(?<!\S)\*\*\w[^*]*\*\*)", text)
+    parts = re.split(r"(`[^`]*`|(?<!\S)\*\w[^*]*\*(?!\w)|(?<!\S)\*\*\w[^*]*\*\*)", text)
     parts[::2] = [re.sub(r"([\\*|`]|_(?!\w))", r"\\\1", part) for part in parts[::2]]
     return "".join(parts)
 

@@ -10,13 +10,17 @@ STYLE = """
     button, .admonition-title::after { display: none !important; }
     .bd-article, .bd-main, .bd-content, .bd-article-container
       { max-width: 100% !important; padding: 0 !important; }
-    html { font-size: 11px !important; }
-    section > h1 { break-before: page; }
+    html { font-size: 13px !important; }
+    span[id^="document-"] + section { break-before: page; }
+    details.hide { display: none; }
+    .cell_output img, figure img { max-height: 85mm; width: auto !important; margin: auto; }
+    .sd-row > * { flex: 0 0 50% !important; width: 50% !important; }
+    .sd-row img { max-height: 60mm; }
     h1, h2, h3, h4 { break-after: avoid; }
     figure, img, table, .math { break-inside: avoid; }
     pre { white-space: pre-wrap !important; overflow-wrap: anywhere; }
     div.cell_output, table { overflow: visible !important; }
-    td, th { overflow-wrap: anywhere; white-space: normal !important; }
+    td, th { overflow-wrap: break-word; white-space: normal !important; }
     """
 
 # A film becomes the picture in its middle, with a word on where it moves.

@@ -244,6 +244,38 @@ def test_the_page_fits_its_window(view, path):
     assert theme == ("dark" if view.page.evaluate(DARK) else "light")
 
 
+CONTRAST = """
+    const channels = colour => colour.match(/[\\d.]+/g).map(Number);
+    const light = ([r, g, b]) => [r, g, b].map(x => x / 255)
+      .map(x => x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4)
+      .reduce((sum, x, i) => sum + x * [0.2126, 0.7152, 0.0722][i], 0);
+    const ground = it => {
+      for (; it; it = it.parentElement) {
+        const colour = channels(getComputedStyle(it).backgroundColor);
+        if (colour.length === 3 || colour[3] === 1) return colour;
+      }
+      return [255, 255, 255];
+    };
+    const pale = [];
+    for (const it of article.querySelectorAll('*')) {
+      const own = [...it.childNodes].some(node => node.nodeType === 3 && node.data.trim());
+      // What shows itself only when pointed at, or is no text, does not count.
+      const furniture = it.closest('.headerlink, .search-button-field, script, style, video');
+      if (!own || furniture || !it.checkVisibility({opacityProperty: true})) continue;
+      const [one, other] = [channels(getComputedStyle(it).color), ground(it)].map(light);
+      const ratio = (Math.max(one, other) + 0.05) / (Math.min(one, other) + 0.05);
+      if (ratio < 4.5) pale.push(`${ratio.toFixed(1)}: ${it.textContent.trim().slice(0, 60)}`);
+    }
+    return pale;
+    """
+
+
+@pytest.mark.parametrize("path", PAGES)
+def test_text_stands_out_from_its_ground(view, path):
+    """At least 4.5 to 1, the Web Content Accessibility Guidelines' level AA."""
+    assert view.go(path).find(CONTRAST) == []
+
+
 DARK = "() => matchMedia('(prefers-color-scheme: dark)').matches"
 
 
