@@ -261,7 +261,8 @@ CONTRAST = """
     for (const it of article.querySelectorAll('*')) {
       const own = [...it.childNodes].some(node => node.nodeType === 3 && node.data.trim());
       // What shows itself only when pointed at, or is no text, does not count.
-      const furniture = it.closest('.headerlink, .search-button__kbd-shortcut, script, style, video');
+      const furniture = it.closest(
+        '.headerlink, .search-button__kbd-shortcut, script, style, video');
       if (!own || furniture || !it.checkVisibility({opacityProperty: true})) continue;
       const [one, other] = [channels(getComputedStyle(it).color), ground(it)].map(light);
       const ratio = (Math.max(one, other) + 0.05) / (Math.min(one, other) + 0.05);
