@@ -8,8 +8,20 @@ PYTHON ?= $(firstword $(shell command -v python3.11 python3))
 BIN := .venv/bin
 NOTEBOOKS := $(wildcard book/[0-9]*.ipynb)
 SITE := _build/html
+# The setting the site was built with is part of the stamp's name: a preview is never taken for the book.
+STAMP := $(SITE)/.complete-$(or $(SEEDS),30)-seeds
 BOOK_SOURCES := _config.yml _toc.yml environment.txt $(wildcard book/*.md book/*.py book/_static/*) \
 	$(NOTEBOOKS) $(shell find rl_core book/data -type f -not -path '*/__pycache__/*' 2>/dev/null)
+
+# `make book SEEDS=3` is a first look with fewer seeds; no other target takes the setting.
+unexport SEEDS
+PREVIEW := $(if $(filter-out 30,$(SEEDS)),_build/preview)
+ifneq ($(SEEDS),)
+PROBLEM := $(shell SEEDS='$(SEEDS)' "$(PYTHON)" book/seeds.py 2>&1 | tail -n 1)
+ifneq ($(PROBLEM),)
+$(error $(PROBLEM))
+endif
+endif
 
 # One thread a process: the parallelism is over seeds, and results must not depend on core counts.
 export OMP_NUM_THREADS := 1
@@ -18,7 +30,7 @@ export SDL_VIDEODRIVER := dummy
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PYDEVD_DISABLE_FILE_VALIDATION := 1
 
-.PHONY: help setup book test lint types unit pairing notebooks sync bench clean
+.PHONY: help setup book pdf test lint types unit pairing notebooks browser sync bench clean
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -34,16 +46,32 @@ setup: .venv/.installed ## make .venv with the pinned environment and the packag
 	@$(BIN)/pip install --quiet --no-build-isolation --no-deps --editable .
 	@touch $@
 
-book: $(SITE)/.complete ## execute the notebooks and build the site into _build/html
-	@echo "The book is at file://$(CURDIR)/$(SITE)/index.html"
+book: $(STAMP) ## execute the notebooks, build the site into _build/html (first look: make book SEEDS=3)
+	@echo "The $(if $(PREVIEW),preview ($(SEEDS) seeds),book) is at file://$(CURDIR)/$(SITE)/index.html"
 
 # Always from nothing: an incremental build passes over warnings in pages it does not read again.
-$(SITE)/.complete: .venv/.installed $(BOOK_SOURCES)
+# A preview is built from a copy of the sources, so that the tables it writes stay out of results/;
+# what it runs is kept in the one store, where the book finds it again.
+$(STAMP): .venv/.installed $(BOOK_SOURCES)
 	@rm -rf _build
-	$(BIN)/jupyter-book build . --warningiserror --nitpick --keep-going
+ifneq ($(PREVIEW),)
+	@mkdir -p results/store _build/preview/results
+	@cp -r _config.yml _toc.yml book _build/preview
+	@ln -s ../../../results/store _build/preview/results/store
+endif
+	SEEDS=$(SEEDS) $(BIN)/jupyter-book build $(or $(PREVIEW),.) --path-output . --warningiserror --nitpick --keep-going
 	@touch $@
 
-test: lint types unit pairing notebooks ## everything that has to pass: style, types, tests, notebooks
+pdf: _build/book.pdf ## print the book to one file, _build/book.pdf (needs Chromium)
+	@echo "The printed book is at file://$(CURDIR)/$<"
+
+# The book once more on a single page, from what Sphinx kept of the pages of the site.
+_build/book.pdf: $(STAMP)
+	SEEDS=$(SEEDS) $(BIN)/jupyter-book build $(or $(PREVIEW),.) --path-output . --builder singlehtml
+	@cp _build/singlehtml/book/intro.html _build/singlehtml/printed.html
+	$(BIN)/python book/paper.py _build/singlehtml/printed.html $@
+
+test: lint types unit pairing notebooks browser ## all that has to pass: style, types, tests, notebooks, pages
 
 lint: .venv/.installed ## style and format (ruff)
 	$(BIN)/ruff check
@@ -60,6 +88,9 @@ pairing: .venv/.installed ## each notebook says the same as its .py twin and hol
 
 notebooks: .venv/.installed ## every notebook at full scale (nbmake)
 	$(BIN)/pytest --nbmake --nbmake-timeout=5400 -o faulthandler_timeout=0 $(NOTEBOOKS)
+
+browser: $(STAMP) ## the built book in a headless Chromium: pictures, mathematics, films, search, phone
+	$(BIN)/pytest tests/browser.py
 
 sync: .venv/.installed ## write the .ipynb twins anew from the .py files
 	$(BIN)/jupytext --update --to ipynb book/[0-9]*.py

@@ -28,6 +28,7 @@ from pathlib import Path
 import pandas as pd
 import planning_figures as drawings
 import planning_study as study
+from figure_data import offer
 from myst_nb import glue
 
 from rl_core import figures, maze_figures
@@ -99,9 +100,11 @@ plan.table.tail(3)
 # scale for all eight. The arrow is the optimal action.
 
 # %% tags=["hide-input"]
+q_values = study.q_value_table(maze, plan.Q)
 for number, flags in enumerate(maze.flag_sets, start=1):
     figure = maze_figures.situation_figure(maze, plan.Q, flags)
     glue(f"fig-{number}", figure, display=False)
+    offer(f"figure_{number}", study.decisions(q_values[q_values["flags"] == (flags or "none")]))
 
 # %% [markdown]
 # ::::{grid} 1 1 2 2
@@ -112,7 +115,7 @@ for number, flags in enumerate(maze.flag_sets, start=1):
 # :name: maze-situation-1
 # :alt: Plan of the maze with no flag held; each free cell shows its value and an arrow for its optimal action.
 #
-# Maze situation 1: no flag held. The goal pays nothing yet, so even beside it the best move is away. From S the arrows lead to A. Hatched cells cannot be entered without taking their flag; their values are those of the model.
+# Maze situation 1: no flag held. The goal pays nothing yet, so even beside it the best move is away. From S the arrows lead to A. Hatched cells cannot be entered without taking their flag; their values are those of the model. Data: {download}`CSV <../results/figures/figure_1.csv>`.
 # ```
 # :::
 #
@@ -121,7 +124,7 @@ for number, flags in enumerate(maze.flag_sets, start=1):
 # :name: maze-situation-2
 # :alt: Plan of the maze with flag A held; each free cell shows its value and an arrow for its optimal action.
 #
-# Maze situation 2: flag A held. Flag A is taken (dashed outline). The arrows lead down to C; only beside the goal is one flag in hand worth more than two later, and only beside B is B near enough.
+# Maze situation 2: flag A held. Flag A is taken (dashed outline). The arrows lead down to C; only beside the goal is one flag in hand worth more than two later, and only beside B is B near enough. Data: {download}`CSV <../results/figures/figure_2.csv>`.
 # ```
 # :::
 #
@@ -130,7 +133,7 @@ for number, flags in enumerate(maze.flag_sets, start=1):
 # :name: maze-situation-3
 # :alt: Plan of the maze with flag B held; each free cell shows its value and an arrow for its optimal action.
 #
-# Maze situation 3: flag B held. All arrows lead to A, but for the cell above C, which takes C first. Even beside the goal it is, just, better to turn back for A than to cash in one flag.
+# Maze situation 3: flag B held. All arrows lead to A, but for the cell above C, which takes C first. Even beside the goal it is, just, better to turn back for A than to cash in one flag. Data: {download}`CSV <../results/figures/figure_3.csv>`.
 # ```
 # :::
 #
@@ -139,7 +142,7 @@ for number, flags in enumerate(maze.flag_sets, start=1):
 # :name: maze-situation-4
 # :alt: Plan of the maze with flag C held; each free cell shows its value and an arrow for its optimal action.
 #
-# Maze situation 4: flag C held. The pull is to A. Beside B it is to B, beside the goal to the goal.
+# Maze situation 4: flag C held. The pull is to A. Beside B it is to B, beside the goal to the goal. Data: {download}`CSV <../results/figures/figure_4.csv>`.
 # ```
 # :::
 #
@@ -148,7 +151,7 @@ for number, flags in enumerate(maze.flag_sets, start=1):
 # :name: maze-situation-5
 # :alt: Plan of the maze with flags A and B held; each free cell shows its value and an arrow for its optimal action.
 #
-# Maze situation 5: flags A and B held. Only C is missing. The upper row walks past it to the goal; the lower rows fetch it first.
+# Maze situation 5: flags A and B held. Only C is missing. The upper row walks past it to the goal; the lower rows fetch it first. Data: {download}`CSV <../results/figures/figure_5.csv>`.
 # ```
 # :::
 #
@@ -157,7 +160,7 @@ for number, flags in enumerate(maze.flag_sets, start=1):
 # :name: maze-situation-6
 # :alt: Plan of the maze with flags A and C held; each free cell shows its value and an arrow for its optimal action.
 #
-# Maze situation 6: flags A and C held. Only B is missing, in the far corner. Nobody but the cell beside it goes there.
+# Maze situation 6: flags A and C held. Only B is missing, in the far corner. Nobody but the cell beside it goes there. Data: {download}`CSV <../results/figures/figure_6.csv>`.
 # ```
 # :::
 #
@@ -166,7 +169,7 @@ for number, flags in enumerate(maze.flag_sets, start=1):
 # :name: maze-situation-7
 # :alt: Plan of the maze with flags B and C held; each free cell shows its value and an arrow for its optimal action.
 #
-# Maze situation 7: flags B and C held. Only A is missing. From its left and from below it is worth a step aside; from its right it is not.
+# Maze situation 7: flags B and C held. Only A is missing. From its left and from below it is worth a step aside; from its right it is not. Data: {download}`CSV <../results/figures/figure_7.csv>`.
 # ```
 # :::
 #
@@ -175,7 +178,7 @@ for number, flags in enumerate(maze.flag_sets, start=1):
 # :name: maze-situation-8
 # :alt: Plan of the maze with flags A, B and C held; each free cell shows its value and an arrow for its optimal action.
 #
-# Maze situation 8: flags A, B and C held. Every arrow leads to the goal, and a value falls by about an eighth with each cell of distance: the discount, and the chance to slip.
+# Maze situation 8: flags A, B and C held. Every arrow leads to the goal, and a value falls by about an eighth with each cell of distance: the discount, and the chance to slip. Data: {download}`CSV <../results/figures/figure_8.csv>`.
 # ```
 # :::
 #
@@ -213,7 +216,6 @@ figures.Film(
 # them below, all 112 rows as {download}`maze_q_values.csv <../results/maze_q_values.csv>`.
 
 # %% tags=["hide-input"]
-q_values = study.q_value_table(maze, plan.Q)
 q_values.to_csv(RESULTS / "maze_q_values.csv", index=False)
 figures.captioned(
     q_values[q_values["flags"].isin(["none", "ABC"]) & q_values["row"].isin([0, 1])],
@@ -236,13 +238,14 @@ figures.captioned(
 glue("sweeps", len(plan.table), display=False)
 glue("error", float(abs(plan.Q - exact.Q).max()), display=False)
 glue("bound", study.ERROR_BOUND, display=False)
+offer("figure_s1_1", plan.table[["sweep", "residual", "norm"]])
 drawings.convergence(plan.table, gamma=study.GAMMA, threshold=study.THRESHOLD)
 
 # %% [markdown]
 # :::{container} caption
 # **Figure S1.1.** Change of the table in each sweep (logarithmic). The residual starts on the
 # bound (dashed) and soon falls well below it. The Frobenius norm (dash-dotted), the report's
-# measure, is never smaller than the residual, so stopping on it is the safer choice.
+# measure, is never smaller than the residual, so stopping on it is the safer choice. Data: {download}`CSV <../results/figures/figure_s1_1.csv>`.
 # :::
 #
 # ## Value iteration against policy iteration
@@ -266,24 +269,26 @@ figures.captioned(
 # %% [markdown]
 # Figure S1.2 draws the two against the work they do, both stopped at the report's threshold. On
 # the Maze a round of policy iteration costs {glue:text}`round_cost:.1f` times a sweep of value iteration, and the whole
-# {glue:text}`whole_cost:.1f` times as much; in the 30 random mazes below {glue:text}`round_cost_random:.1f` and
+# {glue:text}`whole_cost:.1f` times as much; in the {glue:text}`seeds` random mazes below {glue:text}`round_cost_random:.1f` and
 # {glue:text}`whole_cost_random:.1f` times on average.
 
 # %% tags=["hide-input"] mystnb={"image": {"alt": "Line chart: largest error of the values against backups done, for value iteration in many small steps and for policy iteration in a few large ones."}}
-drawings.computation(study.progress(model))
+progress = study.progress(model)
+offer("figure_s1_2", pd.concat(progress, names=["iteration"]).reset_index("iteration"))
+drawings.computation(progress)
 
 # %% [markdown]
 # :::{container} caption
 # **Figure S1.2.** Largest error of the values against the work done so far. A dot is a sweep of value
 # iteration, a cross a round of policy iteration whose evaluation is done by sweeps. Errors below
-# $10^{-9}$ are rounding and drawn there.
+# $10^{-9}$ are rounding and drawn there. Data: {download}`CSV <../results/figures/figure_s1_2.csv>`.
 # :::
 #
 # ## How exact do values have to be?
 #
 # The report notes that values carry more detail than decisions need: as long as the best action
 # stays the best, errors do no harm. To see how much error that is, look at the greedy policy
-# after each sweep, in the Maze and in 30 random mazes of 8 × 8 cells with three flags.
+# after each sweep, in the Maze and in {glue:text}`seeds` random mazes of 8 × 8 cells with three flags.
 
 # %%
 random_mazes = study.mazes()
@@ -291,21 +296,25 @@ course = study.measure(maze)
 sample = pd.DataFrame([{"seed": seed, **study.measure(m)} for seed, m in random_mazes.items()])
 sample.to_csv(RESULTS / "planning_random_mazes.csv", index=False)
 
-# %% tags=["hide-input"] mystnb={"image": {"alt": "Step chart: the share of states decided wrongly falls to zero while the values are still off; thin lines for thirty random mazes, a thick one for the report's Maze."}}
+# %% tags=["hide-input"] mystnb={"image": {"alt": "Step chart: the share of states decided wrongly falls to zero while the values are still off; thin lines for the random mazes, a thick one for the report's Maze."}}
 paths = {seed: study.approach_of(m) for seed, m in random_mazes.items()}
-drawings.coarse_values(study.approach_of(maze), paths)
+report = study.approach_of(maze)
+offer("figure_s1_3", pd.concat({"report": report, **paths}, names=["maze"]).reset_index("maze"))
+drawings.coarse_values(report, paths)
 
 # %% [markdown]
 # :::{container} caption
 # **Figure S1.3.** States whose greedy action is wrong, against how wrong the values still are. Read
 # from left to right: each step is a sweep. In the shaded part the values are off by more than 1%.
-# Data of the random mazes: {download}`planning_random_mazes.csv <../results/planning_random_mazes.csv>`.
+# Data: {download}`CSV <../results/figures/figure_s1_3.csv>`. What was measured on each maze:
+# {download}`planning_random_mazes.csv <../results/planning_random_mazes.csv>`.
 # :::
 #
 # In the Maze all decisions are right, and stay right, from sweep {glue:text}`settled` on. The values are then
 # still off by {glue:text}`coarse_percent:.1f`% of the largest value, {glue:text}`coarse_ratio:.0f` times the error at the end.
 
 # %% tags=["remove-cell"]
+glue("seeds", len(random_mazes), display=False)
 glue("settled", int(course["settled"]), display=False)
 glue("coarse_percent", float(100 * course["settled_error"] / exact.V.max()), display=False)
 glue("coarse_ratio", course["coarseness"], display=False)
@@ -328,7 +337,7 @@ for cost in ("round_cost", "whole_cost"):
 # ## Verdicts
 #
 # The criteria were fixed in code (`book/planning_study.py`) before the measurements were made. What holds for
-# the Maze is exact; the intervals are 95% bootstrap intervals over the 30 random mazes.
+# the Maze is exact; the intervals are 95% bootstrap intervals over the {glue:text}`seeds` random mazes.
 
 # %%
 findings = study.findings(course, sample)

@@ -22,7 +22,7 @@
 # away, and an agent has to learn them by walking through the Maze. The report's figure 9
 # shows its error falling and then stopping, for thousands of episodes, at "a constant gap". Why is there a
 # gap? Why does it not move? And which of the report's rules of thumb for step size and
-# exploration survive 30 seeds instead of one?
+# exploration survive {glue:text}`seeds` seeds instead of one?
 
 # %% tags=["hide-input"]
 from pathlib import Path
@@ -31,6 +31,7 @@ import numpy as np
 import pandas as pd
 import q_learning_figures as drawings
 import q_learning_study as study
+from figure_data import offer, tidy
 from myst_nb import glue
 from q_learning_world import World, faulty_weights
 
@@ -70,7 +71,7 @@ RESULTS.mkdir(exist_ok=True)
 #   would be $\sqrt{448} \approx 21$ times smaller.
 #
 # Each arm below changes one setting of figure 9 (exploitation probability 0.1, step size 0.2, $\gamma = 0.9$) and
-# is run with the same 30 seeds, 0 to 29. Whatever had to be chosen was chosen on other seeds, from 1,000 on.
+# is run with the same {glue:text}`seeds` seeds. Whatever had to be chosen was chosen on other seeds, from 1,000 on.
 # No episode is cut off, except where it says so. Every 50 episodes the greedy policy is tried out as in the course, in 10 episodes of at most 100 steps with 5% random
 # actions, and its exact loss is computed from the model.
 
@@ -80,6 +81,7 @@ results = run(study.ARMS, seeds=study.SEEDS, store=RESULTS / "store")
 found = study.summary(world, results)
 steps = found["steps_in_all"].sum() / 1e6
 seconds = results.provenance["seconds"].sum()
+glue("seeds", len(study.SEEDS), display=False)
 print(f"{len(study.ARMS)} arms, {len(study.SEEDS)} seeds, {study.EPISODES} episodes")
 print(f"{steps:.0f} million steps")
 print(f"{seconds:.0f} seconds of one core, when run")
@@ -93,7 +95,7 @@ original = pd.read_csv("data/original/figure_09_q_learning_rmse.csv")
 noise = world.noise(study.STEP_SIZE, study.EXPLOITATION)
 level = float(np.hypot(world.plateau, noise))
 glue("fig-9", drawings.figure_9(world, norms, original, level), display=False)
-study.figure_9_table(norms).to_csv(RESULTS / "q_learning_figure_9.csv", index=False)
+offer("figure_9", study.figure_9_table(norms))
 late = norms[:, -study.LATE :]
 glue("start_norm", world.start_norm, display=False)
 glue("plateau", world.plateau, display=False)
@@ -103,17 +105,15 @@ glue("distance_2018", study.distance_from_original(norms, original), display=Fal
 # %% [markdown]
 # ```{glue:figure} fig-9
 # :name: q-learning-error
-# :alt: Two line charts of the error against the episode. Above, 30 seeds and the curve of 2018 fall together from 25 to 8 within about 1,000 episodes and stay there. Below, enlarged, all seeds flatten just above a dashed line at 7.957.
+# :alt: Two line charts of the error against the episode. Above, all seeds and the curve of 2018 fall together from 25 to 8 within about 1,000 episodes and stay there. Below, enlarged, all seeds flatten just above a dashed line at 7.957.
 #
-# Error of Q with exploitation probability 0.1 and step size 0.2. Thin lines: 30 seeds. Strong line: their median, with the 95% interval of the median. Behind them the curve of 2018, read off the published plot to within 0.05. Below: the lower end, enlarged. Every seed flattens just above the dashed plateau, which the model gives without any learning; dotted: with the predicted effect of the step size on top.
+# Error of Q with exploitation probability 0.1 and step size 0.2. Thin lines: {glue:text}`seeds` seeds. Strong line: their median, with the 95% interval of the median. Behind them the curve of 2018, read off the published plot to within 0.05. Below: the lower end, enlarged. Every seed flattens just above the dashed plateau, which the model gives without any learning; dotted: with the predicted effect of the step size on top. Data: {download}`CSV <../results/figures/figure_9.csv>`.
 # ```
 #
 # It reproduces. The error starts at {glue:text}`start_norm:.3f`, the norm of $q_*$ itself, since the table starts at
 # zero. It falls, and from about episode 1,500 on it stays put: over the last 1,000 episodes the median
 # seed averages {glue:text}`late:.3f`. The 2018 curve is nowhere in its flat part further than
 # {glue:text}`distance_2018:.2f` from our median; its resolution is 0.05.
-#
-# (The data: {download}`q_learning_figure_9.csv <../results/q_learning_figure_9.csv>`.)
 #
 # ## Why the gap is constant
 #
@@ -151,14 +151,14 @@ figures.captioned(
 arrays = results.arrays(study.FIGURE_9.name)
 after = np.array(study.FIGURE_9.snapshots)
 parts = world.split(arrays["Q_snapshots"], arrays["visits_snapshots"], study.STEP_SIZE)
-study.split_table(after, parts).to_csv(RESULTS / "q_learning_error_split.csv", index=False)
+offer("figure_s2_1", study.split_table(after, parts))
 drawings.error_split(after[1:], {name: part[:, 1:] for name, part in parts.items()})
 
 # %% [markdown]
 # :::{container} caption
-# **Figure S2.1.** The squared error of figure 9, split by how often entries were visited (mean of 30 seeds; the
-# areas add up to the whole). The grey slab never changes. All the learning happens above it. Data:
-# {download}`q_learning_error_split.csv <../results/q_learning_error_split.csv>`.
+# **Figure S2.1.** The squared error of figure 9, split by how often entries were visited (mean of {glue:text}`seeds` seeds; the
+# areas add up to the whole). The grey slab never changes. All the learning happens above it.
+# Data: {download}`CSV <../results/figures/figure_s2_1.csv>`.
 # :::
 
 # %% tags=["hide-input"]
@@ -166,7 +166,8 @@ split = study.final_split(parts)
 glue("unlearned", float(split["share (%)"].iloc[0]), display=False)
 figures.captioned(
     split,
-    "Table 2.2. The squared error after 5,000 episodes: median of 30 seeds with its 95% interval.",
+    f"Table 2.2. The squared error after 5,000 episodes: median of {len(study.SEEDS)} seeds with its "
+    "95% interval.",
     formats=dict.fromkeys(["squared error", "low", "high"], "{:.3f}") | {"share (%)": "{:.2f}"},
 )
 
@@ -184,13 +185,16 @@ glue("noise", noise, display=False)
 glue("level", level, display=False)
 by_step_size = {x: arm.name for x, arm in study.BY_STEP_SIZE.items()}
 predicted = {x: world.noise(x, study.EXPLOITATION) for x in np.geomspace(0.02, 0.9, 12)}
-drawings.noise_law(world, found, by_step_size, predicted)
+left = study.left_over(world, found, by_step_size)
+law = pd.DataFrame(predicted.items(), columns=["step_size", "predicted"])
+offer("figure_s2_2", pd.concat([left, law]))
+drawings.noise_law(left, predicted)
 
 # %% [markdown]
 # :::{container} caption
 # **Figure S2.2.** Error in the entries that can be visited at the end of 5,000 episodes, against the step size: every seed,
 # the median, and the prediction from the model, which has no free parameter. The prediction is exact for
-# small steps and a little low for large ones. Smaller steps would end lower, given the time.
+# small steps and a little low for large ones. Smaller steps would end lower, given the time. Data: {download}`CSV <../results/figures/figure_s2_2.csv>`.
 # :::
 #
 # A step size that shrinks with the visits to an entry, $\alpha_n = n^{-0.6}$, gets rid of the noise: with it the error ends
@@ -239,13 +243,15 @@ glue("near_ties", int((world.stakes() < spread).sum()), display=False)
 glue("lost", 100 * float(of_figure_9["lost"].median()), display=False)
 glue("eval_return", float(of_figure_9["eval_return"].median()), display=False)
 glue("eval_steps", float(of_figure_9["eval_steps"].median()), display=False)
-drawings.wrong_decisions(world, arrays["Q"])
+contested = study.contested(world, arrays["Q"])
+offer("figure_s2_3", contested)
+drawings.wrong_decisions(contested, seeds=len(study.SEEDS))
 
 # %% [markdown]
 # :::{container} caption
-# **Figure S2.3.** Each dot is one of the 92 states: by how much its best action leads in $q_*$, and in how many of 30
+# **Figure S2.3.** Each dot is one of the 92 states: by how much its best action leads in $q_*$, and in how many of {glue:text}`seeds`
 # seeds the learned greedy action is wrong. The smaller the lead, the more often
-# the wrong action wins.
+# the wrong action wins. Data: {download}`CSV <../results/figures/figure_s2_3.csv>`.
 # :::
 #
 # An entry is off by about {glue:text}`spread:.3f`, and in {glue:text}`near_ties` states the best action leads by less than that.
@@ -263,21 +269,22 @@ courses = {
     f"step size {x:g}": study.curves(results, study.BY_STEP_SIZE[x], "rmse_visitable")[:, every]
     for x in (0.9, 0.15, 0.02)
 }
+offer("figure_s2_4", tidy(every + 1, courses, value="error"))
 drawings.courses(every + 1, {("error of Q", "RMSE, visitable entries"): courses})
 
 # %% [markdown]
 # :::{container} caption
 # **Figure S2.4.** Error over the episodes for three step sizes (logarithmic; every seed, median, 95% band). 0.9 is
-# fast and restless, 0.02 calm and late.
+# fast and restless, 0.02 calm and late. Data: {download}`CSV <../results/figures/figure_s2_4.csv>`.
 # :::
 
 # %% tags=["hide-input"] mystnb={"image": {"alt": "Four charts against the step size: the error at the end is smallest at 0.1 and rises on both sides; all entries are visited; what is earned hardly changes; the greedy policy loses value only from 0.5 on."}}
+swept = study.swept(world, found, by_step_size, "step_size")
+offer("figure_s2_5", swept)
 drawings.sweep(
-    found,
-    by_step_size,
+    swept,
     x="step size α (logarithmic)",
     ticks=[0.02, 0.05, 0.15, 0.3, 0.9],
-    optimum=world.optimum,
     log=True,
 )
 
@@ -285,7 +292,7 @@ drawings.sweep(
 # :::{container} caption
 # **Figure S2.5.** What the step size does (dots: seeds; line: median; band: 95%). Error: mean of the last 500 episodes. Earned:
 # discounted return of the last 1,000 training episodes, as a share of the optimum $v_*(s_0)$ (note the scale). Lost: by
-# following the greedy policy after 5,000 episodes.
+# following the greedy policy after 5,000 episodes. Data: {download}`CSV <../results/figures/figure_s2_5.csv>`.
 # :::
 #
 # The advice stands. There is no single best step: the smaller it is, the lower the noise, but the
@@ -296,12 +303,14 @@ drawings.sweep(
 # The report: exploit with probability 0.8 to 0.9 to do well, with 0.1 to 0.2 to learn well.
 
 # %% tags=["hide-input"] mystnb={"image": {"alt": "Four charts against the exploitation probability: the error rises fifty-fold from 0.2 to 0.7; entries never visited rise from 0 to 15 percent; what is earned rises from 3 to about 80 percent of the optimum; from 0.9 on the greedy policy of many seeds loses a fifth."}}
+swept = study.swept(
+    world, found, {x: arm.name for x, arm in study.BY_EXPLOITATION.items()}, "exploitation"
+)
+offer("figure_s2_6", swept)
 drawings.sweep(
-    found,
-    {x: arm.name for x, arm in study.BY_EXPLOITATION.items()},
+    swept,
     x="exploitation probability",
     ticks=[0.1, 0.3, 0.5, 0.7, 0.9],
-    optimum=world.optimum,
     log=False,
 )
 
@@ -309,6 +318,7 @@ drawings.sweep(
 # :::{container} caption
 # **Figure S2.6.** What the exploitation probability does (as in S2.5). Low: every entry is learned and nothing is earned
 # on the way. High: the reverse. From 0.9 on the seeds split: some settle for good on a policy that fetches too few flags.
+# Data: {download}`CSV <../results/figures/figure_s2_6.csv>`.
 # :::
 #
 # This is the trade-off between exploration and exploitation in four panels. With 0.1 the table is nearly perfect
@@ -316,7 +326,7 @@ drawings.sweep(
 # the optimal way*. With 0.8 it earns {glue:text}`earned_mid:.0f`% and with 0.9 {glue:text}`earned_high:.0f`%, but then
 # leaves {glue:text}`unvisited_high:.0f`% of the entries untried.
 #
-# What the report could not see from one run: at 0.9 the greedy policy itself may stay bad. {glue:text}`stuck` of the 30 seeds
+# What the report could not see from one run: at 0.9 the greedy policy itself may stay bad. {glue:text}`stuck` of the {glue:text}`seeds` seeds
 # still lose more than 10% of the optimum after 5,000 episodes. They found one flag early, and what they exploit is the way to
 # that one. With 0.95 it is {glue:text}`stuck_more`, with 0.8 {glue:text}`stuck_less`.
 
@@ -339,19 +349,21 @@ glue("stuck_rising", int(stuck[study.RISES]), display=False)
 # The report: softmax visits less diversely and gets less close to $q_*$.
 
 # %% tags=["hide-input"] mystnb={"image": {"alt": "Four charts against the temperature of softmax: below 0.5 the error is high and entries stay unvisited, from 1 on the error is as low as with epsilon-greedy exploration."}}
+swept = study.swept(
+    world, found, {x: arm.name for x, arm in study.BY_TEMPERATURE.items()}, "temperature"
+)
+offer("figure_s2_7", swept)
 drawings.sweep(
-    found,
-    {x: arm.name for x, arm in study.BY_TEMPERATURE.items()},
+    swept,
     x="temperature T (logarithmic)",
     ticks=[0.02, 0.1, 0.5, 1, 5],
-    optimum=world.optimum,
     log=True,
 )
 
 # %% [markdown]
 # :::{container} caption
 # **Figure S2.7.** What the temperature of softmax does (as in S2.5). It is the same trade-off as in S2.6, mirrored: hot is
-# exploring, cold is exploiting.
+# exploring, cold is exploiting. Data: {download}`CSV <../results/figures/figure_s2_7.csv>`.
 # :::
 #
 # As a statement about softmax it depends on the temperature, which the report does not mention; its formula has $T = 1$. At
@@ -401,35 +413,37 @@ three = {
     "rising from 0.1 to 0.9": study.RISING_ARM,
 }
 blocks = np.arange(window, study.EPISODES + 1, window)
-drawings.courses(
-    blocks,
-    {
-        ("error of Q", "RMSE, visitable entries"): {
-            name: study.curves(results, arm, "rmse_visitable")[:, blocks - 1]
-            for name, arm in three.items()
-        },
-        ("earned while learning", "% of the optimum"): {
-            name: 100 / world.optimum * study.earned_curves(results, arm, window)
-            for name, arm in three.items()
-        },
-    },
+errors = {
+    name: study.curves(results, arm, "rmse_visitable")[:, blocks - 1] for name, arm in three.items()
+}
+earned = {
+    name: 100 / world.optimum * study.earned_curves(results, arm, window)
+    for name, arm in three.items()
+}
+offer(
+    "figure_s2_8", tidy(blocks, errors, value="error").merge(tidy(blocks, earned, value="earned"))
 )
+panels = {
+    ("error of Q", "RMSE, visitable entries"): errors,
+    ("earned while learning", "% of the optimum"): earned,
+}
+drawings.courses(blocks, panels)
 
 # %% [markdown]
 # :::{container} caption
 # **Figure S2.8.** Error, and discounted return while learning (means of 100 episodes), for two constant exploitation
-# probabilities and one that rises (every seed, median, 95% band).
+# probabilities and one that rises (every seed, median, 95% band). Data: {download}`CSV <../results/figures/figure_s2_8.csv>`.
 # :::
 #
 # It works. All entries are visited, and at the end the agent earns as much as the seeds that were lucky with a constant 0.9 (the
-# thin lines of which fall into two bundles, by how many flags they found). Here luck hardly matters: {glue:text}`stuck_rising` of 30 seeds
+# thin lines of which fall into two bundles, by how many flags they found). Here luck hardly matters: {glue:text}`stuck_rising` of {glue:text}`seeds` seeds
 # lose more than 10% of the optimum, against {glue:text}`stuck`. Only the error stays higher than with 0.1 throughout, because the
 # entries off the beaten track stop improving when the agent stops straying. Whether that counts depends on what
 # one wants: the values, or the decisions.
 #
 # ## Verdicts
 #
-# The criteria were fixed in code (`book/q_learning_study.py`) before the 30 seeds were run. Estimates are medians
+# The criteria were fixed in code (`book/q_learning_study.py`) before the seeds reported here were run. Estimates are medians
 # over seeds (of each seed's own ratio where arms are compared), intervals 95% bootstrap intervals.
 
 # %%
@@ -442,7 +456,7 @@ figures.captioned(verdicts, "Table 2.4. The report's claims about Q-learning.")
 # %% tags=["hide-input"]
 figures.captioned(
     details(findings),
-    "Table 2.5. Each criterion with its evidence: the median of 30 seeds and its 95% interval. "
+    f"Table 2.5. Each criterion with its evidence: the median of {len(study.SEEDS)} seeds and its 95% interval. "
     "Evenness is the exponential of the visits' entropy, as a share of the entries.",
 )
 

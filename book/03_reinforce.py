@@ -20,7 +20,7 @@
 #
 # **Question.** In a world of continuous states no table fits. Can a small neural network learn the
 # policy directly, from nothing but the rewards of whole episodes? And do the report's numbers, about
-# 100 steps on Acrobot and 180 on MountainCar, stand up when the experiment is run not once but 30 times?
+# 100 steps on Acrobot and 180 on MountainCar, stand up when the experiment is run not once but {glue:text}`seeds` times?
 
 # %% tags=["hide-input"]
 from pathlib import Path
@@ -29,6 +29,7 @@ import numpy as np
 import pandas as pd
 import reinforce_figures as drawings
 import reinforce_study as study
+from figure_data import offer
 from myst_nb import glue
 
 from rl_core import figures
@@ -86,6 +87,7 @@ pd.DataFrame(
 
 # %%
 results = study.learn(RESULTS / "store")
+glue("seeds", len(study.SEEDS), display=False)
 curves = study.Curves(results.table)
 
 # %% [markdown]
@@ -96,6 +98,7 @@ for number, name, file in ((10, "Acrobot", "acrobot"), (11, "MountainCar", "moun
     original = pd.read_csv(ORIGINAL / f"figure_{number}_{file}_reinforce.csv")
     figure = drawings.learning_curve(curves, f"{name}, as reported", original)
     glue(f"fig-{number}", figure, display=False)
+    offer(f"figure_{number}", curves.rows([f"{name}, as reported"]))
     around = original[(original["episode"] - study.REPORTED_AT[name]).abs() < 50]
     for edge in ("low", "high"):
         glue(f"{file}-{edge}", float(around[edge].median()), display=False)
@@ -106,14 +109,14 @@ for number, name, file in ((10, "Acrobot", "acrobot"), (11, "MountainCar", "moun
 # %% [markdown]
 # ```{glue:figure} fig-10
 # :name: acrobot-reinforce
-# :alt: Learning curves of thirty seeds on Acrobot over the published curve; most fall from thousands of steps to about a hundred, some never leave the cap.
+# :alt: Learning curves of all seeds on Acrobot over the published curve; most fall from thousands of steps to about a hundred, some never leave the cap.
 #
 # Learning curve for Acrobot-v1 using REINFORCE. Each thin line is a seed (median of its last 100
 # episodes), the strong line their median, the band its 95% interval; behind them the curve of
-# 2018, which is not smoothed. Dotted: seeds that did not learn.
+# 2018, which is not smoothed. Dotted: seeds that did not learn. Data: {download}`CSV <../results/figures/figure_10.csv>`.
 # ```
 #
-# {glue:text}`acrobot-as-reported` of 30 seeds learn (at most 500 steps in the last 100 episodes). The others ran
+# {glue:text}`acrobot-as-reported` of {glue:text}`seeds` seeds learn (at most 500 steps in the last 100 episodes). The others ran
 # out of budget. They spend it on episodes that do not end within 5,000 steps; these are stopped and thrown away, so nothing is
 # learned from them. A seed that gets out of this late may be cut off while doing well. The
 # published curve is that of a seed that got out at once.
@@ -122,13 +125,13 @@ for number, name, file in ((10, "Acrobot", "acrobot"), (11, "MountainCar", "moun
 #
 # ```{glue:figure} fig-11
 # :name: mountaincar-reinforce
-# :alt: Learning curves of thirty seeds on MountainCar over the published curve, falling from tens of thousands of steps to a few hundred.
+# :alt: Learning curves of all seeds on MountainCar over the published curve, falling from tens of thousands of steps to a few hundred.
 #
 # Learning curve for MountainCar-v0 using REINFORCE, drawn as Figure 10. The first episodes take
-# tens of thousands of steps: a random policy hardly ever gets out of the valley.
+# tens of thousands of steps: a random policy hardly ever gets out of the valley. Data: {download}`CSV <../results/figures/figure_11.csv>`.
 # ```
 #
-# {glue:text}`mountaincar-as-reported` of 30 seeds learn. The others used up their budget in enormous early episodes and were
+# {glue:text}`mountaincar-as-reported` of {glue:text}`seeds` seeds learn. The others used up their budget in enormous early episodes and were
 # stopped before the end, some of them while doing well.
 #
 # Are the numbers in the report's text those of its figures? Read off the published plots, Acrobot runs between
@@ -140,7 +143,7 @@ for number, name, file in ((10, "Acrobot", "acrobot"), (11, "MountainCar", "moun
 #
 # The report says that $\gamma = 0.99$ beats 0.9, that Acrobot needs two hidden layers and MountainCar only one.
 # It does not say that returns were normalised. Each of these is an arm of its own, with one change against
-# the reported settings and 30 seeds. One hidden layer means 10 units.
+# the reported settings and {glue:text}`seeds` seeds. One hidden layer means 10 units.
 
 # %% tags=["hide-input"] mystnb={"image": {"alt": "Median learning curves with bands on Acrobot for the reported settings, gamma 0.9, one hidden layer, and raw returns."}}
 names = {
@@ -149,20 +152,23 @@ names = {
     "one hidden layer": "one hidden layer",
     "raw returns": "returns not normalised",
 }
+offer("figure_s3_1", curves.rows([f"Acrobot, {variant}" for variant in names]))
 drawings.variants(curves, "Acrobot", names)
 
 # %% [markdown]
 # :::{container} caption
-# **Figure S3.1.** Acrobot: median over 30 seeds and its 95% interval for each arm. A seed out of budget counts
+# **Figure S3.1.** Acrobot: median over {glue:text}`seeds` seeds and its 95% interval for each arm. A seed out of budget counts
 # as needing for ever; where more than half are, the line ends. With γ = 0.9 most seeds learn at first, and then unlearn.
+# Data: {download}`CSV <../results/figures/figure_s3_1.csv>`.
 # :::
 
 # %% tags=["hide-input"] mystnb={"image": {"alt": "Median learning curves with bands on MountainCar for the reported settings, gamma 0.9, one hidden layer, and raw returns."}}
+offer("figure_s3_2", curves.rows([f"MountainCar, {variant}" for variant in names]))
 drawings.variants(curves, "MountainCar", names)
 
 # %% [markdown]
 # :::{container} caption
-# **Figure S3.2.** MountainCar: the same.
+# **Figure S3.2.** MountainCar: the same. Data: {download}`CSV <../results/figures/figure_s3_2.csv>`.
 # :::
 
 # %% tags=["hide-input"]
@@ -171,7 +177,7 @@ milestones.to_csv(RESULTS / "reinforce_milestones.csv", index=False)
 figures.captioned(
     milestones,
     "Table 3.1. Steps an episode at the report's milestones (each seed's median over the last 100 "
-    "episodes; median over 30 seeds [95% interval]; ∞: more than half of the seeds had stopped).",
+    f"episodes; median over {len(study.SEEDS)} seeds [95% interval]; ∞: more than half of the seeds had stopped).",
 )
 
 # %% [markdown]
@@ -206,7 +212,7 @@ film(
 # %% [markdown]
 # :::{container} caption
 # **Film S3.1.** Acrobot before learning (left) and after (right), for as long as the trained agent needs. The seed is number
-# {glue:text}`Acrobot-seed`, the one in the middle when all 30 are ordered by their steps at the end.
+# {glue:text}`Acrobot-seed`, the one in the middle when all {glue:text}`seeds` are ordered by their steps at the end.
 # :::
 
 # %% tags=["hide-input"]
@@ -228,13 +234,13 @@ film(
 figures.captioned(
     study.wall_clock(results, {"Acrobot": 2, "MountainCar": 3}),
     "Table 3.2. Time for one run, in the report (minutes, its machine unknown) and now, on one core.",
-    formats={"2018 (s)": "{:.0f}", "now (s, mean of 30)": "{:.1f}", "now, all 30 (s)": "{:.0f}"},
+    formats={"2018 (s)": "{:.0f}", "now (s, mean)": "{:.1f}", "now, all seeds (s)": "{:.0f}"},
 )
 
 # %% [markdown]
 # ## Verdicts
 #
-# The criteria stand in `book/reinforce_study.py` and were fixed before the runs with seeds 0 to 29. "About"
+# The criteria stand in `book/reinforce_study.py` and were fixed before the runs with the seeds reported here. "About"
 # means within a quarter. Intervals are 95% bootstrap intervals over seeds.
 
 # %%
@@ -260,9 +266,9 @@ glue("seeds-3e", study.seeds_to_tell(three_e.evidence[0], 0.5), display=False)
 # two layers are slower would take about {glue:text}`seeds-3d` seeds.
 #
 # **What to take along.** The step the report leaves out is the one that matters most. Without normalised returns
-# {glue:text}`acrobot-raw-returns` of 30 seeds learn Acrobot and {glue:text}`mountaincar-raw-returns` learn MountainCar. All rewards are negative, so every raw return says "less of this", and the
+# {glue:text}`acrobot-raw-returns` of {glue:text}`seeds` seeds learn Acrobot and {glue:text}`mountaincar-raw-returns` learn MountainCar. All rewards are negative, so every raw return says "less of this", and the
 # longest, most hopeless episodes say it loudest. With the episode's mean taken off, the better half of the actions is
-# encouraged. Next comes the discount: with 0.9, {glue:text}`acrobot-gamma-0.9` and {glue:text}`mountaincar-gamma-0.9` of 30 seeds learn. A second layer helps on MountainCar, where
-# the report thought it too much (without it {glue:text}`layer-ratio:.2f` times as many steps), and makes no difference that 30 seeds
+# encouraged. Next comes the discount: with 0.9, {glue:text}`acrobot-gamma-0.9` and {glue:text}`mountaincar-gamma-0.9` of {glue:text}`seeds` seeds learn. A second layer helps on MountainCar, where
+# the report thought it too much (without it {glue:text}`layer-ratio:.2f` times as many steps), and makes no difference that {glue:text}`seeds` seeds
 # can show on Acrobot, where the report thought it needed. And a single published curve is the curve of one seed: it says that a method *can*
 # work, not that it does.

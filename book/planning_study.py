@@ -1,7 +1,7 @@
 """Chapter 1: what the report claims about planning, what would bear it out, and how it is measured.
 
-The claims speak of one maze. Each is put to that maze, where the answer is exact, and to thirty
-random mazes, to see whether it is true of planning or only of that one maze.
+The claims speak of one maze. Each is put to that maze, where the answer is exact, and to random
+mazes, one a seed, to see whether it is true of planning or only of that one maze.
 """
 
 import time
@@ -10,6 +10,7 @@ from itertools import islice, pairwise
 
 import numpy as np
 import pandas as pd
+from seeds import SEEDS
 
 from rl_core.claims import Claim, Criterion, Evidence, Finding
 from rl_core.maze import ACTIONS, Maze, random_maze
@@ -28,7 +29,6 @@ from rl_core.statistics import bootstrap_interval
 
 GAMMA = 0.9
 THRESHOLD = 1e-5
-SEEDS = range(30)
 # Stopping at a difference of THRESHOLD leaves an error of at most gamma / (1 - gamma) times that.
 ERROR_BOUND = GAMMA / (1 - GAMMA) * THRESHOLD
 TIE = 1e-8
@@ -109,7 +109,7 @@ CLAIMS = (
 
 
 def mazes(seeds: range = SEEDS) -> dict[int, Maze]:
-    """Thirty random mazes of 8 x 8 cells with three flags, one a seed."""
+    """Random mazes of 8 x 8 cells with three flags, one a seed."""
     return {
         seed: random_maze(8, 8, flags=3, wall_fraction=0.25, rng=np.random.default_rng(seed))
         for seed in seeds
@@ -189,6 +189,13 @@ def q_value_table(maze: Maze, Q: np.ndarray) -> pd.DataFrame:
     table.insert(0, "state", np.arange(len(Q)))
     table["flags"] = table["flags"].replace("", "none")
     return table.assign(**dict(zip(ACTIONS, Q.T, strict=True)))
+
+
+def decisions(q_values: pd.DataFrame) -> pd.DataFrame:
+    """What a figure of a situation shows of `q_value_table`: each cell's value and best action."""
+    values = q_values[list(ACTIONS)]
+    best = {"value": values.max(axis=1), "action": values.idxmax(axis=1)}
+    return q_values[["state", "row", "column", "flags"]].assign(**best)
 
 
 def measure(maze: Maze) -> dict[str, float]:

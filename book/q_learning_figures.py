@@ -34,7 +34,7 @@ def band(axes: Axes, x: np.ndarray, curves: np.ndarray, *, colour: str, ls="-", 
 
 
 def figure_9(world: World, norms: np.ndarray, original: pd.DataFrame, level: float) -> Figure:
-    """The report's figure 9, 30 seeds over the curve of 2018; below, its lower end enlarged."""
+    """The report's figure 9, every seed over the curve of 2018; below, its lower end enlarged."""
     figure, (top, bottom) = plt.subplots(2, figsize=(WIDTH, 6.2), height_ratios=(3, 2))
     every = np.arange(0, EPISODES, 10)
     for axes in (top, bottom):
@@ -45,7 +45,8 @@ def figure_9(world: World, norms: np.ndarray, original: pd.DataFrame, level: flo
             zorder=0,
             label="2018 original",
         )
-        band(axes, every + 1, norms[:, every], colour=BLUE, name="median of 30 seeds, 95% band")
+        name = f"median of {len(norms)} seeds, 95% band"
+        band(axes, every + 1, norms[:, every], colour=BLUE, name=name)
         axes.axhline(
             world.plateau,
             color=BLACK,
@@ -81,7 +82,7 @@ def error_split(episodes: Sequence[int], parts: Mapping[str, np.ndarray]) -> Fig
         "rarely visited": (SKY_BLUE, "..", "visited rarely"),
         "often visited: noise": (VERMILLION, "", "visited often"),
     }
-    below = np.zeros(len(episodes))
+    below, seeds = np.zeros(len(episodes)), len(parts["cannot be visited"])
     for name, (colour, hatch, words) in looks.items():
         height = parts[name].mean(axis=0)
         axes.fill_between(
@@ -95,28 +96,25 @@ def error_split(episodes: Sequence[int], parts: Mapping[str, np.ndarray]) -> Fig
         below = below + height
     axes.set(xscale="log", xlim=(1, EPISODES), ylim=(0, None))
     _ticks(axes.xaxis, [1, 10, 100, 1000, EPISODES])
-    label(axes, x="episode (logarithmic)", y="‖Q − Q*‖², mean of 30 seeds")
+    label(axes, x="episode (logarithmic)", y=f"‖Q − Q*‖², mean of {seeds} seeds")
     axes.legend(loc="upper right", reverse=True, frameon=True, framealpha=0.9)
     plt.close(figure)
     return figure
 
 
-def noise_law(
-    world: World, found: pd.DataFrame, step_sizes: Mapping[float, str], predicted: Mapping
-) -> Figure:
+def noise_law(left: pd.DataFrame, predicted: Mapping[float, float]) -> Figure:
     """What a constant step size leaves of the error, against the prediction from the model."""
     figure, axes = plt.subplots(figsize=(WIDTH, 3.6))
-    for x, name in step_sizes.items():
-        left = np.sqrt(world.entries) * found.loc[found["arm"] == name, "error"].to_numpy()
-        axes.plot(np.full(len(left), x), left, ".", color=BLUE, ms=4, alpha=0.25, ls="none")
-        axes.plot(x, np.median(left), "o", color=BLUE, ms=7, ls="none")
+    axes.plot(left["step_size"], left["measured"], ".", color=BLUE, ms=4, alpha=0.25, ls="none")
+    medians = left.groupby("step_size")["measured"].median()
+    axes.plot(medians.index, medians, "o", color=BLUE, ms=7, ls="none")
     axes.plot([], [], "o", color=BLUE, ls="none", label="measured: every seed, and the median")
     fine = sorted(predicted)
     axes.plot(
         fine, [predicted[x] for x in fine], color=VERMILLION, ls="-", label="predicted, model alone"
     )
     axes.set(xscale="log", yscale="log")
-    _ticks(axes.xaxis, list(step_sizes))
+    _ticks(axes.xaxis, list(medians.index))
     _ticks(axes.yaxis, [0.2, 0.5, 1, 2, 5])
     axes.text(0.0225, 2.6, "smaller steps:\nnot there yet after\n5,000 episodes", va="top")
     label(axes, x="step size α (logarithmic)", y="‖Q − Q*‖, visitable entries")
@@ -125,17 +123,16 @@ def noise_law(
     return figure
 
 
-def wrong_decisions(world: World, Q: np.ndarray) -> Figure:
+def wrong_decisions(contested: pd.DataFrame, *, seeds: int) -> Figure:
     """How often a state is decided wrongly, against how much is at stake there."""
     figure, axes = plt.subplots(figsize=(WIDTH, 3.6))
-    stakes, wrong = world.stakes(), 100 * world.wrong(Q).mean(axis=0)
-    axes.plot(stakes, wrong, "o", color=BLUE, ms=6, alpha=0.6, ls="none")
+    axes.plot(contested["lead"], contested["wrong"], "o", color=BLUE, ms=6, alpha=0.6, ls="none")
     axes.set(xscale="log", ylim=(-3, 103))
     _ticks(axes.xaxis, [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5])
     label(
         axes,
         x="lead of the best action over the second best in Q* (logarithmic)",
-        y="wrong after 5,000 episodes\n(% of 30 seeds)",
+        y=f"wrong after 5,000 episodes\n(% of {seeds} seeds)",
     )
     plt.close(figure)
     return figure
@@ -172,23 +169,15 @@ MEASURES = {
 }
 
 
-def sweep(
-    found: pd.DataFrame,
-    arms: Mapping[float, str],
-    *,
-    x: str,
-    ticks: Sequence[float],
-    optimum: float,
-    log: bool,
-) -> Figure:
-    """What a parameter does to the error, to coverage, to what is earned and to what is learned."""
+def sweep(swept: pd.DataFrame, *, x: str, ticks: Sequence[float], log: bool) -> Figure:
+    """What a parameter does to the error, to coverage, to what is earned and to what is learned.
+
+    The parameter is the first column of `swept`.
+    """
     figure, panels = plt.subplots(2, 2, figsize=(6.0, 5.8))
-    values = np.array(list(arms))
     for axes, (measure, (title, unit)) in zip(panels.flat, MEASURES.items(), strict=True):
-        scale = {"error": 1, "unvisited": 100, "earned": 100 / optimum, "lost": 100}[measure]
-        seeds = scale * np.stack(
-            [found.loc[found["arm"] == name, measure].to_numpy() for name in arms.values()], axis=1
-        )
+        of_seeds = swept.pivot(index="seed", columns=swept.columns[0], values=measure)
+        values, seeds = of_seeds.columns.to_numpy(), of_seeds.to_numpy()
         axes.plot(values, seeds.T, ".", color=BLUE, ls="none", ms=4, alpha=0.2, zorder=1)
         middle, low, high = bootstrap_interval(seeds, rng=np.random.default_rng(2018))
         axes.fill_between(values, low, high, color=BLUE, alpha=0.25, lw=0)

@@ -4,9 +4,12 @@ The report's epsilon is the probability of exploiting. Here it is called `exploi
 takes the standard epsilon, 1 - exploitation.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 import pandas as pd
 from q_learning_world import GAMMA, World
+from seeds import SEEDS
 
 from rl_core.arm import Arm
 from rl_core.claims import Claim, Criterion, Evidence, Finding
@@ -15,7 +18,6 @@ from rl_core.exploration import EpsilonGreedy, Linear, Softmax, UnnormalisedSoft
 from rl_core.q_learning import QLearningConfig, q_learning_on_model
 from rl_core.statistics import bootstrap_interval
 
-SEEDS = range(30)
 EPISODES = 5_000
 STEP_SIZE = 0.2
 EXPLOITATION = 0.1
@@ -317,6 +319,44 @@ def distance_from_original(norms: np.ndarray, original: pd.DataFrame) -> float:
     flat = original[original["episode"].between(1_500, EPISODES)]
     median = np.median(norms, axis=0)[flat["episode"].astype(int) - 1]
     return float(np.abs(flat[["low", "high"]].mean(axis=1) - median).max())
+
+
+MEASURES = ("error", "unvisited", "earned", "lost")
+"""What a parameter of exploration or learning is judged by."""
+
+
+def swept(world: World, found: pd.DataFrame, arms: Mapping[float, str], name: str) -> pd.DataFrame:
+    """The `MEASURES` of each arm and seed against the parameter `name` that the arms differ in.
+
+    The error is an RMSE; `unvisited` is in % of the entries, `earned` and `lost` in % of the
+    optimum.
+    """
+    scales = {"error": 1, "unvisited": 100, "earned": 100 / world.optimum, "lost": 100}
+    values = {arm: x for x, arm in arms.items()}
+    rows = found[found["arm"].isin(values)]
+    table = rows[["seed"]].assign(**{m: scales[m] * rows[m] for m in MEASURES})
+    table.insert(0, name, rows["arm"].map(values))
+    return table.reset_index(drop=True)
+
+
+def left_over(world: World, found: pd.DataFrame, step_sizes: Mapping[float, str]) -> pd.DataFrame:
+    """The norm of the error in the visitable entries at the end, for each step size and seed."""
+    table = swept(world, found, step_sizes, "step_size")
+    norm = np.sqrt(world.entries) * table["error"]
+    return table[["step_size", "seed"]].assign(measured=norm)
+
+
+def contested(world: World, Q: np.ndarray) -> pd.DataFrame:
+    """For each visitable state: the lead of its best action, and in what % of seeds Q has another.
+
+    Q has the shape (seeds, S, A).
+    """
+    states = np.flatnonzero(world.visitable)
+    places = [world.maze.locate(state) for state in states]
+    table = pd.DataFrame(places, columns=["row", "column", "flags"])
+    table.insert(0, "state", states)
+    table["flags"] = table["flags"].replace("", "none")
+    return table.assign(lead=world.stakes(), wrong=100 * world.wrong(Q).mean(axis=0))
 
 
 def split_table(after: np.ndarray, parts: dict[str, np.ndarray]) -> pd.DataFrame:

@@ -9,13 +9,12 @@ from matplotlib import font_manager
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 from PIL import Image, ImageDraw, ImageFont
-from reinforce_study import EPISODES, Curves
+from reinforce_study import DRAWN, Curves
 
 from rl_core.figures import BLACK, BLUE, COLOURS, GREY, LINES, Film, label
 from rl_core.rollouts import Rollout
 from rl_core.statistics import bootstrap_interval
 
-EVERY = 10  # episodes between drawn points
 LIMIT = {"Acrobot": 500, "MountainCar": 200}  # Gymnasium's own time limits, for orientation
 
 
@@ -29,8 +28,7 @@ def learning_curve(curves: Curves, arm: str, original: pd.DataFrame) -> Figure:
         lw=0,
         label="2018 original, one run",
     )
-    x = np.arange(EVERY, EPISODES + 1, EVERY)
-    seeds = curves.smooth[arm][:, x - 1]
+    x, seeds = DRAWN, curves.smooth[arm][:, DRAWN - 1]
     learned = curves.learned(arm)
     for steps, good in zip(seeds, learned, strict=True):
         axes.plot(x, steps, color=GREY if good else BLACK, ls="-" if good else ":", lw=0.6)
@@ -41,7 +39,7 @@ def learning_curve(curves: Curves, arm: str, original: pd.DataFrame) -> Figure:
     if not learned.all():
         text = f"{(~learned).sum()} that did not (× out of budget)"
         axes.plot([], [], color=BLACK, ls=":", lw=0.8, label=text)
-    _median(axes, x, seeds, BLUE, "-", "median of all 30 seeds, 95% interval")
+    _median(axes, x, seeds, BLUE, "-", f"median of all {len(seeds)} seeds, 95% interval")
     axes.set_yscale("log")
     label(axes, x="episode", y="steps to the goal (log scale)")
     axes.legend(fontsize=9)
@@ -52,11 +50,11 @@ def learning_curve(curves: Curves, arm: str, original: pd.DataFrame) -> Figure:
 def variants(curves: Curves, name: str, names: Mapping[str, str]) -> Figure:
     """Median and interval of each variant on one environment; its share of seeds that learned."""
     figure, axes = plt.subplots(figsize=(6.4, 4.4))
-    x = np.arange(EVERY, EPISODES + 1, EVERY)
     for i, (variant, text) in enumerate(names.items()):
         arm = f"{name}, {variant}"
-        share = f"{text} ({curves.learned(arm).sum()} of 30 learned)"
-        _median(axes, x, curves.smooth[arm][:, x - 1], COLOURS[i], LINES[i], share)
+        learned = curves.learned(arm)
+        share = f"{text} ({learned.sum()} of {len(learned)} learned)"
+        _median(axes, DRAWN, curves.smooth[arm][:, DRAWN - 1], COLOURS[i], LINES[i], share)
     axes.axhline(LIMIT[name], color=GREY, lw=0.8, ls="-")
     note = f"Gymnasium's time limit, {LIMIT[name]}"
     axes.text(0, LIMIT[name], note, ha="left", va="bottom", fontsize=8)

@@ -1,0 +1,293 @@
+"""The built book in a headless browser: what a reader would see, on a desk and on a phone.
+
+Run by `make browser`, which builds the book first. The browser is a Chromium or Chrome that is
+installed already; `CHROMIUM` names another one.
+"""
+
+import os
+import threading
+from collections.abc import Iterator
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from urllib.parse import urldefrag
+
+import pytest
+from chromium import NoBrowserError, open_browser
+from playwright.sync_api import Browser, Page, Route
+
+SITE = Path(__file__).parent.parent / "_build" / "html"
+PAGES = sorted(
+    path.relative_to(SITE).as_posix()
+    for path in SITE.rglob("*.html")
+    if not path.relative_to(SITE).parts[0].startswith("_")
+)
+VIEWS = {
+    f"{name} {scheme}": {"viewport": {"width": width, "height": 900}, "color_scheme": scheme}
+    for name, width in (("desk", 1400), ("phone", 390))
+    for scheme in ("light", "dark")
+}
+
+
+class QuietHandler(SimpleHTTPRequestHandler):
+    """Serves the site and keeps no log."""
+
+    def log_message(self, *_arguments: object) -> None:
+        """Say nothing."""
+
+
+@pytest.fixture(scope="session")
+def address() -> Iterator[str]:
+    """Serve the site as a web server would: from a file, browsers refuse some of its fonts."""
+    assert (SITE / "index.html").exists(), f"no book in {SITE}: make book"
+    handler = partial(QuietHandler, directory=str(SITE))
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+        thread.join()
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """A browser without a window; on a machine without any there is nothing to see with."""
+    try:
+        with open_browser() as browser:
+            yield browser
+    except NoBrowserError as error:
+        if os.environ.get("CI"):
+            raise
+        pytest.skip(str(error))
+
+
+class Visit:
+    """One page in one view, with everything that went wrong on the way."""
+
+    def __init__(self, page: Page, address: str) -> None:
+        self.page, self.address = page, address
+        self.problems: list[str] = []
+        page.set_default_timeout(120_000)  # milliseconds: for a machine that is busy
+        page.on("console", self._console)
+        page.on("pageerror", lambda error: self.problems.append(f"error: {error}"))
+        page.on("requestfailed", lambda request: self.problems.append(f"failed: {request.url}"))
+        page.on("response", self._response)
+        page.route(lambda url: not url.startswith((address, "data:", "blob:")), self._outside)
+
+    def _console(self, message) -> None:
+        if message.type in ("error", "warning"):
+            self.problems.append(f"console: {message.text}")
+
+    def _response(self, response) -> None:
+        if response.status >= 400:
+            self.problems.append(f"{response.status}: {response.url}")
+
+    def _outside(self, route: Route) -> None:
+        self.problems.append(f"another host: {route.request.url}")
+        route.abort()
+
+    def go(self, path: str) -> "Visit":
+        """Open a page, and wait until it has loaded everything and set its mathematics."""
+        self.problems.clear()
+        self.page.goto(f"{self.address}/{path}", wait_until="networkidle")
+        self.page.wait_for_function(
+            "() => !window.MathJax || MathJax.startup.promise.then(() => true)"
+        )
+        return self
+
+    def find(self, script: str) -> list[str]:
+        """What a script finds in the article."""
+        return self.page.evaluate(
+            f"async () => {{ const article = document.querySelector('article, main'); {script} }}"
+        )
+
+
+@pytest.fixture(scope="module", params=VIEWS)
+def view(request, browser, address) -> Iterator[Visit]:
+    """A window of a certain width, light or dark."""
+    with browser.new_context(**VIEWS[request.param]) as context:
+        yield Visit(context.new_page(), address)
+
+
+@pytest.fixture(scope="module")
+def desk(browser, address) -> Iterator[Visit]:
+    """A wide, light window."""
+    with browser.new_context(**VIEWS["desk light"]) as context:
+        yield Visit(context.new_page(), address)
+
+
+@pytest.fixture(scope="module", params=PAGES)
+def visit(request, browser, address) -> Iterator[Visit]:
+    """Each page, opened once for all that is asked of it."""
+    with browser.new_context(**VIEWS["desk light"]) as context:
+        yield Visit(context.new_page(), address).go(request.param)
+
+
+def test_nothing_is_missing_and_nothing_comes_from_elsewhere(visit):
+    assert visit.problems == []
+
+
+def test_mathematics_is_set(visit):
+    unset = visit.find(
+        "return [...article.querySelectorAll('.math')]"
+        ".filter(it => !it.querySelector('mjx-container')).map(it => it.textContent)"
+    )
+    wrong = visit.find(
+        "return [...article.querySelectorAll('mjx-merror, [data-mml-node=merror]')]"
+        ".map(it => it.textContent)"
+    )
+    assert unset == []
+    assert wrong == []
+
+
+def test_pictures_are_there_and_described(visit):
+    broken = visit.find(
+        """
+        const broken = [];
+        for (const image of article.querySelectorAll('img')) {
+          await image.decode().catch(() => {});
+          if (image.naturalWidth === 0) broken.push(`not shown: ${image.src}`);
+          if (!image.alt.trim() || /^[_.]*\\/?_images\\//.test(image.alt))
+            broken.push(`not described: ${image.src}`);
+        }
+        return broken;
+        """
+    )
+    assert broken == []
+
+
+def test_films_play_and_are_described(visit):
+    broken = visit.find(
+        """
+        const broken = [];
+        for (const film of article.querySelectorAll('video')) {
+          const name = film.getAttribute('aria-label');
+          if (!name) broken.push('not described');
+          if (!film.controls) broken.push(`no controls: ${name}`);
+          if (!film.paused) broken.push(`starts by itself: ${name}`);
+          await film.play().catch(error => broken.push(`${error}: ${name}`));
+          film.pause();
+          if (!(film.duration > 0 && film.videoWidth > 0)) broken.push(`empty: ${name}`);
+        }
+        return broken;
+        """
+    )
+    assert broken == []
+
+
+CAPTION = """
+    const captionOf = it =>
+      it.closest('figure')?.querySelector('figcaption') ??
+      (it.closest('.cell')?.nextElementSibling?.matches('.caption')
+        ? it.closest('.cell').nextElementSibling : null);
+    """
+
+
+def test_pictures_and_films_have_captions(visit):
+    bare = visit.find(
+        CAPTION + "return [...article.querySelectorAll('img, video')]"
+        ".filter(it => !captionOf(it)?.textContent.trim())"
+        ".map(it => it.alt || it.getAttribute('aria-label'))"
+    )
+    assert bare == []
+
+
+def test_figures_offer_their_data(visit):
+    without = visit.find(
+        CAPTION + "return [...article.querySelectorAll('img')].map(captionOf)"
+        ".filter(it => it && !it.querySelector('a.download')).map(it => it.textContent)"
+    )
+    assert without == []
+
+
+def test_downloads_are_there(visit):
+    files = visit.find("return [...article.querySelectorAll('a.download')].map(it => it.href)")
+    for file in files:
+        answer = visit.page.request.get(file)
+        assert answer.ok, file
+        assert answer.body(), f"empty: {file}"
+
+
+def test_links_within_the_book_lead_somewhere(visit):
+    links = visit.page.evaluate(
+        "() => [...document.querySelectorAll('a[href]')].map(it => it.href)"
+        ".filter(it => it.startsWith(location.origin))"
+    )
+    for link in {urldefrag(link).url for link in links}:
+        assert visit.page.request.head(link).ok, link
+    here = urldefrag(visit.page.url).url
+    targets = {urldefrag(link).fragment for link in links if urldefrag(link).url == here} - {""}
+    lost = visit.page.evaluate(
+        "targets => targets.filter(it => !document.getElementById(decodeURIComponent(it)))",
+        sorted(targets),
+    )
+    assert lost == []
+
+
+def test_a_preview_says_so_on_every_page(visit):
+    stamps = [path.name for path in SITE.glob(".complete-*-seeds")]
+    assert len(stamps) == 1
+    preview = stamps != [".complete-30-seeds"]
+    banner = visit.page.locator(".bd-header-announcement", has_text="Preview")
+    assert banner.count() == preview
+
+
+@pytest.mark.parametrize("path", PAGES)
+def test_the_page_fits_its_window(view, path):
+    """Nothing sticks out at the side, and the reader's choice of light or dark is kept."""
+    view.go(path)
+    assert view.problems == []
+    theme, wide, window = view.page.evaluate(
+        "() => [document.documentElement.dataset.theme, document.documentElement.scrollWidth,"
+        " document.documentElement.clientWidth]"
+    )
+    assert wide <= window
+    assert theme == ("dark" if view.page.evaluate(DARK) else "light")
+
+
+CONTRAST = """
+    const channels = colour => colour.match(/[\\d.]+/g).map(Number);
+    const light = ([r, g, b]) => [r, g, b].map(x => x / 255)
+      .map(x => x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4)
+      .reduce((sum, x, i) => sum + x * [0.2126, 0.7152, 0.0722][i], 0);
+    const ground = it => {
+      for (; it; it = it.parentElement) {
+        const colour = channels(getComputedStyle(it).backgroundColor);
+        if (colour.length === 3 || colour[3] === 1) return colour;
+      }
+      return [255, 255, 255];
+    };
+    const pale = [];
+    for (const it of article.querySelectorAll('*')) {
+      const own = [...it.childNodes].some(node => node.nodeType === 3 && node.data.trim());
+      // What shows itself only when pointed at, or is no text, does not count.
+      const furniture = it.closest(
+        '.headerlink, .search-button__kbd-shortcut, script, style, video');
+      if (!own || furniture || !it.checkVisibility({opacityProperty: true})) continue;
+      const [one, other] = [channels(getComputedStyle(it).color), ground(it)].map(light);
+      const ratio = (Math.max(one, other) + 0.05) / (Math.min(one, other) + 0.05);
+      if (ratio < 4.5) pale.push(`${ratio.toFixed(1)}: ${it.textContent.trim().slice(0, 60)}`);
+    }
+    return pale;
+    """
+
+
+@pytest.mark.parametrize("path", PAGES)
+def test_text_stands_out_from_its_ground(view, path):
+    """At least 4.5 to 1, the Web Content Accessibility Guidelines' level AA."""
+    assert view.go(path).find(CONTRAST) == []
+
+
+DARK = "() => matchMedia('(prefers-color-scheme: dark)').matches"
+
+
+def test_search_finds_a_word(desk):
+    desk.go("search.html?q=policy")
+    desk.page.locator("ul.search li a").first.wait_for()
+    assert desk.problems == []
+
+
+def test_search_finds_nothing_where_nothing_is(desk):
+    desk.go("search.html?q=xylophone")
+    desk.page.get_by_text("did not match any documents").first.wait_for()
+    assert desk.page.locator("ul.search li").count() == 0

@@ -1,0 +1,52 @@
+"""The setting `SEEDS`: what it allows, and that it reaches the studies of all chapters."""
+
+import importlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from seeds import FULL, SEEDS, chosen
+
+ROOT = Path(__file__).parent.parent
+STUDIES = sorted(path.stem for path in (ROOT / "book").glob("*_study.py"))
+
+
+@pytest.mark.parametrize("count", [2, 3, FULL])
+def test_the_first_so_many_seeds_are_chosen(count):
+    assert list(chosen(str(count))) == list(range(count))
+
+
+@pytest.mark.parametrize("text", ["", "0", "1", str(FULL + 1), "-3", "3.0", "three", "3 4", "²"])
+def test_anything_else_is_refused_with_what_is_allowed(text):
+    with pytest.raises(ValueError, match=f"whole number from 2 to {FULL}, got {text!r}"):
+        chosen(text)
+
+
+def module_in_a_new_process(code, **setting):
+    environment = {name: value for name, value in os.environ.items() if name != "SEEDS"} | setting
+    command = [sys.executable, "-c", code]
+    return subprocess.run(
+        command, cwd=ROOT / "book", env=environment, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.mark.parametrize(
+    ("setting", "expected"),
+    [({}, "30 False"), ({"SEEDS": ""}, "30 False"), ({"SEEDS": "4"}, "4 True")],
+)
+def test_a_preview_is_what_has_fewer_seeds_than_the_book(setting, expected):
+    code = "import seeds; print(len(seeds.SEEDS), seeds.PREVIEW)"
+    assert module_in_a_new_process(code, **setting).stdout.strip() == expected
+
+
+def test_a_bad_setting_stops_the_import():
+    done = module_in_a_new_process("import seeds", SEEDS="many")
+    assert done.returncode != 0
+    assert "SEEDS must be a whole number from 2 to 30, got 'many'" in done.stderr
+
+
+@pytest.mark.parametrize("study", STUDIES)
+def test_every_study_uses_the_setting(study):
+    assert getattr(importlib.import_module(study), "SEEDS", SEEDS) is SEEDS
