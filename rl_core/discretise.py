@@ -96,7 +96,7 @@ def make_grid(
         require(finite, name, bound.tolist(), "finite in every dimension; give bounds to use")
         bounds.append(bound)
     require(bool((bounds[0] < bounds[1]).all()), "low", bounds[0].tolist(), "below high")
-    numbers = (bins,) * d if isinstance(bins, int | np.integer) else tuple(bins)
+    numbers = tuple(bins) if isinstance(bins, Sequence) else (bins,) * d
     valid = len(numbers) == d and all(is_integer(n, 1) for n in numbers)
     require(valid, "bins", bins, f"a positive integer, or {d} of them")
     cells = math.prod(int(n) for n in numbers)
@@ -117,7 +117,7 @@ def cell(grid: Grid, observation: NDArray[np.float32]) -> int:
     index = 0
     for k in range(observation.size):
         width = grid.high[k] - grid.low[k]
-        i = int(math.floor(grid.bins[k] * ((np.float64(observation[k]) - grid.low[k]) / width)))
+        i = math.floor(grid.bins[k] * ((np.float64(observation[k]) - grid.low[k]) / width))
         index = index * grid.bins[k] + min(max(i, 0), grid.bins[k] - 1)
     return index
 

@@ -13,8 +13,8 @@
 action.) With Q(s', .) = 0 for terminal s'. An episode that is cut off did not end: its last update
 looks at Q(s', .) as any other does.
 
-The loop is written once, in `_learn`. For an `MDP` or a gridded task it is compiled; for a Gymnasium
-environment it runs as it stands. Both agree bit for bit when the environment plays the model.
+The loop is written once, in `_learn`. For an `MDP` or a gridded task it is compiled; for a
+Gymnasium environment it runs as it stands. Both agree bit for bit where both play the same world.
 """
 
 from __future__ import annotations
@@ -345,9 +345,7 @@ def _learn_episode(
 
 
 @register_jitable
-def _try_episode(
-    world: World, task: _Task, streams: Streams, Q: Values
-) -> tuple[float, float]:
+def _try_episode(world: World, task: _Task, streams: Streams, Q: Values) -> tuple[float, float]:
     """Play an episode of the evaluation; return its return and steps."""
     steps, total, terminated, truncated = 0, 0.0, False, False
     s = start(world, streams)

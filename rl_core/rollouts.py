@@ -50,7 +50,7 @@ def weights_of(
     return {name.rpartition("/")[2]: arrays[name][position] for name in names}
 
 
-def _policy(config: ReinforceConfig, weights: Weights) -> tuple[Policy, NDArray[np.float32]]:
+def policy_of(config: ReinforceConfig, weights: Weights) -> tuple[Policy, NDArray[np.float32]]:
     """Put a policy and its parameter vector together again."""
     sizes, network = networks.pack(weights)
     if not isinstance(config.policy, Gaussian):
@@ -97,7 +97,7 @@ def action_probabilities(
     array([[0.25, 0.25, 0.25, 0.25]], dtype=float32)
     """
     require(not isinstance(config.policy, Gaussian), "policy", config.policy, "Categorical()")
-    policy, parameters = _policy(config, weights)
+    policy, parameters = policy_of(config, weights)
     scores = networks.output(policy.sizes.tolist(), parameters, observations)
     powers = np.exp(scores - scores.max(axis=1, keepdims=True))
     probabilities: NDArray[np.float32] = powers / powers.sum(axis=1, keepdims=True)
@@ -134,7 +134,7 @@ def mean_actions(
     array([[21.]], dtype=float32)
     """
     require(isinstance(config.policy, Gaussian), "policy", config.policy, "Gaussian(...)")
-    policy, parameters = _policy(config, weights)
+    policy, parameters = policy_of(config, weights)
     features = np.asarray(observations, np.float32)
     if policy.constant_feature:
         features = np.column_stack([features, np.ones(len(features), np.float32)])
@@ -209,7 +209,7 @@ def rollout(
     environment_seed = int(rng.integers(2**32))
     environment = open_environment(env)
     try:
-        policy, parameters = _policy(config, weights)
+        policy, parameters = policy_of(config, weights)
         expected = environment.n_observations + policy.constant_feature
         require(
             policy.sizes[0] == expected,
