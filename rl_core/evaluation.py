@@ -127,6 +127,7 @@ def evaluate(
     seed: int,
     episodes: int,
     max_steps: int,
+    limit: int | None = None,
     measures: Mapping[str, Measure] | None = None,
 ) -> pd.DataFrame:
     """Play episodes with a policy as it is.
@@ -143,6 +144,8 @@ def evaluate(
         How many.
     max_steps : int
         Where to stop an episode that has not ended.
+    limit : int, optional
+        A time limit, at most `max_steps`, under which the same episodes are counted as well.
     measures : mapping of str to callable, optional
         Further columns: `measure(observations, actions, rewards)` of the episode, with arrays of
         shape (T + 1, n_observations), (T, action_width) and (T,).
@@ -151,7 +154,9 @@ def evaluate(
     -------
     pandas.DataFrame
         One row an episode: `episode` (from 1), `steps`, `return` (undiscounted), `terminated`
-        (false: stopped by `max_steps` or the environment's own time limit), and the measures.
+        (false: stopped by `max_steps` or the environment's own time limit), and the measures. With
+        a limit, `limited_steps`, `limited_return` and `limited_terminated`: what they would have
+        been, had the episode been cut off there.
 
     Raises
     ------
@@ -164,7 +169,7 @@ def evaluate(
     >>> table["return"].tolist(), table["terminated"].tolist()
     ([-50.0, -50.0], [False, False])
     """
-    _check(seed, episodes, max_steps)
+    _check(seed, episodes, max_steps, limit)
     policy, parameters = agent
     environment_seed, rng = evaluation_streams(seed)
     environment = open_environment(env)
@@ -174,21 +179,27 @@ def evaluate(
         environment.seed(environment_seed)
         trajectory = Trajectory(environment.n_observations, policy.action_width)
         rows = []
-        for episode in range(1, episodes + 1):
+        for _ in range(episodes):
             steps, terminated = environment.play(policy, parameters, rng, max_steps, trajectory)
             _, actions, rewards = trajectory.first(steps)
-            row = {"episode": episode, "steps": steps, "return": float(rewards.sum())}
-            row["terminated"] = terminated
+            row = {"steps": steps, "return": rewards.sum(), "terminated": terminated}
+            row["limited_return"] = rewards[: limit or max_steps].sum()
             for name, measure in (measures or {}).items():
                 row[name] = measure(trajectory.observations[: steps + 1], actions, rewards)
             rows.append(row)
     finally:
         environment.close()
-    return pd.DataFrame(rows)
+    return _table(pd.DataFrame(rows), limit)
 
 
 def evaluate_table(
-    world: Binned, Q: NDArray[np.float64], *, seed: int, episodes: int, max_steps: int
+    world: Binned,
+    Q: NDArray[np.float64],
+    *,
+    seed: int,
+    episodes: int,
+    max_steps: int,
+    limit: int | None = None,
 ) -> pd.DataFrame:
     """Play episodes with the greedy policy of a table, from the starts of `evaluate`.
 
@@ -198,13 +209,13 @@ def evaluate_table(
         See `rl_core.discretise.binned`.
     Q : float64 array of shape `world.shape`
         Action values. Of several largest ones, one is drawn.
-    seed, episodes, max_steps
+    seed, episodes, max_steps, limit
         As for `evaluate`.
 
     Returns
     -------
     pandas.DataFrame
-        One row an episode: `episode`, `steps`, `return`, `terminated`.
+        As `evaluate` returns it.
 
     Raises
     ------
@@ -219,15 +230,23 @@ def evaluate_table(
     >>> table["steps"].item(), table["terminated"].item()
     (9, False)
     """
-    _check(seed, episodes, max_steps)
+    _check(seed, episodes, max_steps, limit)
     require(Q.shape == world.shape, "Q", Q.shape, f"of shape {world.shape}")
     environment_seed, rng = evaluation_streams(seed)
     starts = np.random.default_rng(environment_seed)
-    played = np.empty((episodes, 3))
-    _play_table(world, Q, starts, rng, max_steps, played)
-    table = pd.DataFrame(played, columns=["steps", "return", "terminated"])
-    table = table.astype({"steps": int, "terminated": bool})
-    table.insert(0, "episode", np.arange(1, episodes + 1))
+    played = np.empty((episodes, 4))
+    _play_table(world, Q, starts, rng, max_steps, limit or max_steps, played)
+    table = pd.DataFrame(played, columns=["steps", "return", "terminated", "limited_return"])
+    return _table(table.astype({"steps": int, "terminated": bool}), limit)
+
+
+def _table(table: pd.DataFrame, limit: int | None) -> pd.DataFrame:
+    """Number the episodes, and count them under the limit if there is one."""
+    table.insert(0, "episode", np.arange(1, len(table) + 1))
+    if limit is None:
+        return table.drop(columns="limited_return")
+    table["limited_steps"] = table["steps"].clip(upper=limit)
+    table["limited_terminated"] = table["terminated"] & (table["steps"] <= limit)
     return table
 
 
@@ -238,21 +257,26 @@ def _play_table(
     starts: np.random.Generator,
     rng: np.random.Generator,
     max_steps: int,
+    limit: int,
     played: NDArray[np.float64],
 ) -> None:
-    """Write steps, return and end of every episode."""
+    """Write steps, return, end and limited return of every episode."""
     for k in range(len(played)):
         s = start_binned(world, starts)
-        steps, total, terminated = 0, 0.0, False
+        steps, total, limited, terminated = 0, 0.0, 0.0, False
         while steps < max_steps and not terminated:
             a = choose(EPSILON_GREEDY, 0.0, Q[s], rng.random(), rng.random())
             s, reward, terminated = step_binned(world, a)
             total += reward
+            limited += reward if steps < limit else 0.0
             steps += 1
-        played[k, 0], played[k, 1], played[k, 2] = steps, total, 1.0 if terminated else 0.0
+        played[k, 0], played[k, 1] = steps, total
+        played[k, 2], played[k, 3] = 1.0 if terminated else 0.0, limited
 
 
-def _check(seed: int, episodes: int, max_steps: int) -> None:
+def _check(seed: int, episodes: int, max_steps: int, limit: int | None) -> None:
     require(is_integer(seed, 0), "seed", seed, "an integer from 0")
     require(is_integer(episodes, 1), "episodes", episodes, "a positive integer")
     require(is_integer(max_steps, 1), "max_steps", max_steps, "a positive integer")
+    valid = limit is None or (is_integer(limit, 1) and limit <= max_steps)
+    require(valid, "limit", limit, f"None or an integer from 1 to max_steps ({max_steps})")

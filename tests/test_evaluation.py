@@ -146,9 +146,34 @@ def test_any_other_environment():
     assert (table["return"] > 100).all()
 
 
+def test_under_a_limit_the_same_episodes_are_cut():
+    world = binned("MountainCarContinuous-v0", (1, 2), levels=3)
+    Q = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    network = {"layer0.weight": np.array([[0], [50]]), "log_sigma": np.array([-3])}
+    agent = as_learned(
+        ReinforceConfig(hidden=(), policy=Gaussian(mean="direct")),
+        {name: array.astype(np.float32) for name, array in network.items()},
+    )
+    for play in (
+        lambda **cut: evaluate_table(world, Q, seed=0, episodes=30, **cut),
+        lambda **cut: evaluate("MountainCarContinuous-v0", agent, seed=0, episodes=30, **cut),
+    ):
+        long = play(max_steps=10_000, limit=106)
+        assert long["terminated"].all()
+        within = long["steps"] <= 106
+        assert 0 < within.sum() < 30
+        np.testing.assert_array_equal(long["limited_terminated"], within)
+        np.testing.assert_array_equal(long["limited_steps"], np.minimum(long["steps"], 106))
+        np.testing.assert_array_equal(long["limited_return"][within], long["return"][within])
+        assert (long["limited_return"][~within] < 0).all()
+        first = play(max_steps=106).iloc[0]
+        assert first["steps"] == long["limited_steps"].iloc[0]
+        assert first["return"] == pytest.approx(long["limited_return"].iloc[0], abs=1e-12)
+
+
 def test_bad_arguments():
     agent = uniform(2, 3)
-    for bad in ({"seed": -1}, {"episodes": 0}, {"max_steps": 0.5}):
+    for bad in ({"seed": -1}, {"episodes": 0}, {"max_steps": 0.5}, {"limit": 6}):
         arguments = {"seed": 0, "episodes": 1, "max_steps": 5} | bad
         with pytest.raises(ValueError, match=next(iter(bad))):
             evaluate("MountainCar-v0", agent, **arguments)
