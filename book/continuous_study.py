@@ -122,7 +122,7 @@ CLAIMS = (
                 "gets to 300 steps in fewer episodes",
             )
         ),
-        "Figure S5.6",
+        "Figure S5.4",
     ),
     Claim(
         "4c",
@@ -223,9 +223,9 @@ class Curves:
             for arm, rows in self.rows.items()
         }
 
-    def at(self, arm: str, episode: int = EPISODES) -> np.ndarray:
-        """Steps of each seed at an episode; infinite where the seed had stopped before."""
-        steps = self.smooth[arm][:, episode - 1]
+    def at(self, arm: str, episode: int | None = None) -> np.ndarray:
+        """Steps of each seed at an episode or the last; infinite where it had stopped before."""
+        steps = self.smooth[arm][:, (episode or EPISODES) - 1]
         return np.where(np.isnan(steps), np.inf, steps)
 
     def final_return(self, arm: str) -> np.ndarray:
@@ -233,8 +233,8 @@ class Curves:
         returns = self.returns[arm][:, -1]
         return np.where(np.isnan(returns), -np.inf, returns)
 
-    def learned(self, arm: str, episode: int = EPISODES) -> np.ndarray:
-        """Which seeds had learned by an episode."""
+    def learned(self, arm: str, episode: int | None = None) -> np.ndarray:
+        """Which seeds had learned by an episode, or by the last."""
         return learned(self.raw[arm][:, :episode], LEARNED, window=WINDOW)
 
     def episodes_to(self, arm: str, steps: float = CONVERGED) -> np.ndarray:
