@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import continuous_study
+import dqn_study
 import numpy as np
 import pandas as pd
 import reinforce_study
@@ -81,6 +82,7 @@ def reported_arms() -> list[Arm]:
     """The networks as the chapters before trained them, named by environment and agent."""
     studies = (
         ("REINFORCE", reinforce_study.arms(), "{}, as reported"),
+        ("DQN", dqn_study.arms(), "{}, as reported"),
         ("REINFORCE", continuous_study.arms(), "as reported"),
     )
     environments = {env: name for name, env in ENV.items()}
