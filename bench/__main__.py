@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pandas as pd
 
-MODULES = ("planning", "q_learning", "reinforce")
+MODULES = ("planning", "q_learning", "reinforce", "dqn")
 RESULTS = Path(__file__).parent.parent / "results"
 
 

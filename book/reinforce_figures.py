@@ -102,8 +102,9 @@ def _frames(env_id: str, episode: Rollout) -> list[np.ndarray]:
     env = gym.make(env_id, render_mode="rgb_array", max_episode_steps=-1)
     env.reset(seed=episode.environment_seed)
     pictures = [env.render()]
-    for action in episode.actions[:, 0]:
-        env.step(int(action))
+    discrete = isinstance(env.action_space, gym.spaces.Discrete)
+    for action in episode.actions:
+        env.step(int(action[0]) if discrete else action)
         pictures.append(env.render())
     env.close()
     return [np.asarray(Image.fromarray(picture).reduce(2)) for picture in pictures]

@@ -45,8 +45,8 @@ def is_integer(value: object, least: int) -> bool:
 
 
 def is_number(value: object) -> bool:
-    """Tell whether a value is a finite number."""
-    return isinstance(value, int | float) and math.isfinite(value)
+    """Tell whether a value is a finite number, not a bool."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,8 @@ class Gaussian:
     """Continuous actions: a_k ~ N(mu_k(s), sigma_k^2), independently for every component k.
 
     Actions are neither squashed nor clipped here: the log-probability is that of the raw sample,
-    and the environment does with it what it does.
+    and the environment does with it what it does. So the bounds of its action space are not used,
+    and need not be finite.
 
     Attributes
     ----------
@@ -89,6 +90,9 @@ class Gaussian:
         require(self.mean in ("weights", "direct"), "mean", self.mean, "'weights' or 'direct'")
         valid = is_number(self.sigma) and self.sigma > 0
         require(valid, "sigma", self.sigma, "a finite number above 0")
+        for name in ("learn_sigma", "constant_feature"):
+            value = getattr(self, name)
+            require(isinstance(value, bool), name, value, "a bool")
 
 
 class Policy(NamedTuple):

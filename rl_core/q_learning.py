@@ -13,8 +13,8 @@
 action.) With Q(s', .) = 0 for terminal s'. An episode that is cut off did not end: its last update
 looks at Q(s', .) as any other does.
 
-The loop is written once, in `_learn`. For an `MDP` it is compiled; for a Gymnasium environment it
-runs as it stands. Both agree bit for bit when the environment plays the model.
+The loop is written once, in `_learn`. For an `MDP` or a gridded task it is compiled; for a
+Gymnasium environment it runs as it stands. Both agree bit for bit where both play the same world.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rl_core import tabular
 from rl_core.compiled import compiled
+from rl_core.discretise import Binned
 from rl_core.exploration import (
     EPSILON_GREEDY,
     EpsilonGreedy,
@@ -47,7 +48,7 @@ from rl_core.exploration import (
 from rl_core.mdp import MDP
 from rl_core.planning import value_iteration
 from rl_core.run import Failure, Run
-from rl_core.tabular import Environment, Model, Played, Streams, start, step
+from rl_core.tabular import Environment, Played, Streams, World, start, step
 from rl_core.tabular_record import (
     Yardstick,
     as_table,
@@ -113,7 +114,7 @@ class QLearningConfig:
 
 
 def q_learning(
-    env: Environment | MDP,
+    env: Environment | MDP | Binned,
     config: QLearningConfig,
     *,
     episodes: int,
@@ -126,9 +127,10 @@ def q_learning(
 
     Parameters
     ----------
-    env : MDP or str or gymnasium.Env or callable
-        A model, which is played compiled; or an environment, its id, or a function that makes one,
-        with discrete observations and actions, which is played in a plain loop.
+    env : MDP or Binned or str or gymnasium.Env or callable
+        A model, or a compiled task seen through a grid (`rl_core.discretise.binned`), both played
+        compiled; or an environment, its id, or a function that makes one, with discrete
+        observations and actions, played in a plain loop.
     config : QLearningConfig
         Settings.
     episodes : int
@@ -185,19 +187,14 @@ def q_learning(
     ((2, 112, 4), 200)
     """
     _check_arguments(config, episodes, seeds, snapshots)
-    if isinstance(env, MDP):
-        shape = (env.n_states, env.n_actions)
-        yardstick = make_yardstick(env, Q_star, shape)
-        learner = _Learner(_learn_compiled, tabular.model_arrays(env), shape, yardstick)
-        return _train(learner, config, episodes, seeds, snapshots, progress)
-    world = tabular.played(env)
+    world, model, shape = tabular.opened(env)
     try:
-        shape = (int(world.observations.n), int(world.actions.n))
-        yardstick = make_yardstick(tabular.known_model(world), Q_star, shape)
-        learner = _Learner(_learn, world, shape, yardstick)
+        yardstick = make_yardstick(model, Q_star, shape)
+        learn = _learn if isinstance(world, Played) else _learn_compiled
+        learner = _Learner(learn, world, shape, yardstick)
         return _train(learner, config, episodes, seeds, snapshots, progress)
     finally:
-        if world.env is not env:
+        if isinstance(world, Played) and world.env is not env:
             world.env.close()
 
 
@@ -298,7 +295,7 @@ def _task(config: QLearningConfig, episodes: int) -> _Task:
 
 
 def _learn(
-    world: Model | Played,
+    world: World,
     task: _Task,
     yardstick: Yardstick,
     streams: Streams,
@@ -328,7 +325,7 @@ def _learn(
 
 @register_jitable
 def _learn_episode(
-    world: Model | Played, task: _Task, streams: Streams, Q: Values, visits: Counts, k: int
+    world: World, task: _Task, streams: Streams, Q: Values, visits: Counts, k: int
 ) -> tuple[int, float, bool, int]:
     """Learn from episode k; return its steps, return, end and newly visited entries."""
     steps, total, new_entries, terminated, truncated = 0, 0.0, 0, False, False
@@ -348,9 +345,7 @@ def _learn_episode(
 
 
 @register_jitable
-def _try_episode(
-    world: Model | Played, task: _Task, streams: Streams, Q: Values
-) -> tuple[float, float]:
+def _try_episode(world: World, task: _Task, streams: Streams, Q: Values) -> tuple[float, float]:
     """Play an episode of the evaluation; return its return and steps."""
     steps, total, terminated, truncated = 0, 0.0, False, False
     s = start(world, streams)
@@ -384,7 +379,7 @@ class _Learner(NamedTuple):
     """The loop, the world it plays in, the shape of Q, and what Q is measured against."""
 
     learn: Callable[..., int]
-    world: Model | Played
+    world: World
     shape: tuple[int, int]
     yardstick: Yardstick
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from gymnasium import spaces
 from numpy.typing import NDArray
 
 from rl_core import networks
@@ -50,7 +51,7 @@ def weights_of(
     return {name.rpartition("/")[2]: arrays[name][position] for name in names}
 
 
-def _policy(config: ReinforceConfig, weights: Weights) -> tuple[Policy, NDArray[np.float32]]:
+def policy_of(config: ReinforceConfig, weights: Weights) -> tuple[Policy, NDArray[np.float32]]:
     """Put a policy and its parameter vector together again."""
     sizes, network = networks.pack(weights)
     if not isinstance(config.policy, Gaussian):
@@ -97,7 +98,7 @@ def action_probabilities(
     array([[0.25, 0.25, 0.25, 0.25]], dtype=float32)
     """
     require(not isinstance(config.policy, Gaussian), "policy", config.policy, "Categorical()")
-    policy, parameters = _policy(config, weights)
+    policy, parameters = policy_of(config, weights)
     scores = networks.output(policy.sizes.tolist(), parameters, observations)
     powers = np.exp(scores - scores.max(axis=1, keepdims=True))
     probabilities: NDArray[np.float32] = powers / powers.sum(axis=1, keepdims=True)
@@ -134,7 +135,7 @@ def mean_actions(
     array([[21.]], dtype=float32)
     """
     require(isinstance(config.policy, Gaussian), "policy", config.policy, "Gaussian(...)")
-    policy, parameters = _policy(config, weights)
+    policy, parameters = policy_of(config, weights)
     features = np.asarray(observations, np.float32)
     if policy.constant_feature:
         features = np.column_stack([features, np.ones(len(features), np.float32)])
@@ -146,6 +147,42 @@ def mean_actions(
     per_feature = outputs.reshape(len(features), policy.action_width, features.shape[1])
     means: NDArray[np.float32] = np.einsum("nkf,nf->nk", per_feature, features)
     return means
+
+
+def state_grid(space: spaces.Box, points: int) -> NDArray[np.float32]:
+    """Lay an even grid over a space of observations, to look at a policy in every part of it.
+
+    Parameters
+    ----------
+    space : gymnasium.spaces.Box
+        Of n-dimensional observations; its bounds have to be finite.
+    points : int
+        Points along each dimension, at least 2; the bounds are among them.
+
+    Returns
+    -------
+    float32 array of shape (points ** n, n)
+        The last dimension runs fastest.
+
+    Raises
+    ------
+    ValueError
+        If the space is no such Box, a bound is not finite, or `points` is too small.
+
+    Examples
+    --------
+    >>> space = spaces.Box(np.array([0, -1], np.float32), np.array([1, 1], np.float32))
+    >>> state_grid(space, 2).tolist()
+    [[0.0, -1.0], [0.0, 1.0], [1.0, -1.0], [1.0, 1.0]]
+    """
+    valid = isinstance(space, spaces.Box) and len(space.shape) == 1
+    require(valid, "space", space, "a Box of one axis")
+    finite = bool(np.isfinite(space.low).all() and np.isfinite(space.high).all())
+    require(finite, "space", space, "a Box with finite bounds, because a grid has to end somewhere")
+    require(is_integer(points, 2), "points", points, "an integer from 2")
+    axes = [np.linspace(*bounds, points) for bounds in zip(space.low, space.high, strict=True)]
+    grid = np.meshgrid(*axes, indexing="ij")
+    return np.stack(grid, axis=-1).reshape(-1, len(axes)).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -209,7 +246,7 @@ def rollout(
     environment_seed = int(rng.integers(2**32))
     environment = open_environment(env)
     try:
-        policy, parameters = _policy(config, weights)
+        policy, parameters = policy_of(config, weights)
         expected = environment.n_observations + policy.constant_feature
         require(
             policy.sizes[0] == expected,

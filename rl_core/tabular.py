@@ -1,9 +1,10 @@
 """Worlds of finitely many states and actions, to be acted in one step at a time.
 
-There are two kinds, with the same two verbs, `start` and `step`: an `MDP`, as arrays that compiled
-code steps through (`Model`), and any discrete Gymnasium environment (`Played`). Given equal
-streams, an environment and its model behave alike. A loop written with these verbs is plain Python
-for both kinds, and can be compiled for a `Model`.
+There are three kinds, with the same two verbs, `start` and `step`: an `MDP`, as arrays that
+compiled code steps through (`Model`), a compiled task seen through a grid (`Binned`), and any
+discrete Gymnasium environment (`Played`). Given equal streams, an environment and its model behave
+alike. A loop written with these verbs is plain Python for all kinds, and can be compiled for the
+first two.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from rl_core.compiled import compiled
+from rl_core.discretise import Binned, start_binned, step_binned
 from rl_core.mdp import MDP
 
 Environment = str | gym.Env[Any, Any] | Callable[[], gym.Env[Any, Any]]
@@ -146,17 +148,46 @@ def known_model(world: Played) -> MDP | None:
     return model if model.n_states in (n_states, n_states + 1) else None
 
 
-def start(world: Model | Played, streams: Streams) -> int:
+World = Model | Binned | Played
+
+
+def opened(env: Environment | MDP | Binned) -> tuple[World, MDP | None, tuple[int, int]]:
+    """Return the world to act in, its model if it has one, and its numbers of states and actions.
+
+    Raises
+    ------
+    TypeError, ValueError
+        See `played`.
+
+    Examples
+    --------
+    >>> world, model, shape = opened("FrozenLake-v1")
+    >>> type(world).__name__, shape
+    ('Played', (16, 4))
+    """
+    if isinstance(env, MDP):
+        return model_arrays(env), env, (env.n_states, env.n_actions)
+    if isinstance(env, Binned):
+        return env, None, env.shape
+    world = played(env)
+    return world, known_model(world), (int(world.observations.n), int(world.actions.n))
+
+
+def start(world: World, streams: Streams) -> int:
     """Begin an episode; return its start state."""
     if isinstance(world, Played):
         return _start_in_env(world, streams)
+    if isinstance(world, Binned):
+        return start_binned(world, streams.start)
     return _start_on_model(world, streams)
 
 
-def step(world: Model | Played, s: int, a: int, streams: Streams) -> tuple[int, float, bool, bool]:
+def step(world: World, s: int, a: int, streams: Streams) -> tuple[int, float, bool, bool]:
     """Take action a in the current state s; return s', r, terminated, truncated."""
     if isinstance(world, Played):
         return _step_in_env(world, a)
+    if isinstance(world, Binned):
+        return _step_in_grid(world, a)
     return _step_on_model(world, s, a, streams)
 
 
@@ -175,6 +206,13 @@ def _step_on_model(model: Model, s: int, a: int, streams: Streams) -> tuple[int,
 
 
 @compiled
+def _step_in_grid(world: Binned, a: int) -> tuple[int, float, bool, bool]:
+    """Take a step; nothing truncates."""
+    s_next, r, terminated = step_binned(world, a)
+    return s_next, r, terminated, False
+
+
+@compiled
 def _slot(cumulative: NDArray[np.float64], u: float) -> int:
     """Return the first slot whose cumulative probability exceeds u, as Gymnasium does."""
     for k in range(len(cumulative)):
@@ -183,11 +221,17 @@ def _slot(cumulative: NDArray[np.float64], u: float) -> int:
     return 0
 
 
-# In compiled code a world is always a model, and the verbs mean these.
-overload(start)(lambda world, streams: lambda world, streams: _start_on_model(world, streams))
-overload(step)(
-    lambda world, s, a, streams: lambda world, s, a, streams: _step_on_model(world, s, a, streams)
-)
+# What the verbs mean in compiled code is decided by the type of the world.
+_starts: dict[type, Callable[..., int]] = {
+    Model: lambda world, streams: _start_on_model(world, streams),
+    Binned: lambda world, streams: start_binned(world, streams.start),
+}
+_steps: dict[type, Callable[..., tuple[int, float, bool, bool]]] = {
+    Model: lambda world, s, a, streams: _step_on_model(world, s, a, streams),
+    Binned: lambda world, s, a, streams: _step_in_grid(world, a),
+}
+overload(start)(lambda world, streams: _starts[world.instance_class])
+overload(step)(lambda world, s, a, streams: _steps[world.instance_class])
 
 
 def _start_in_env(world: Played, streams: Streams) -> int:

@@ -22,6 +22,7 @@ from toy_learner import ToyConfig, count_threads, learn
 import rl_core
 from rl_core import experiments
 from rl_core.experiments import Arm, DamagedResultWarning, run
+from rl_core.policies import Gaussian
 from rl_core.reinforce import ReinforceConfig, reinforce
 from rl_core.store import ARRAYS, RECORD, TABLE, Store
 
@@ -30,6 +31,20 @@ PLAIN = Arm("plain", learn, "toy", ToyConfig(), 20, (0, 20))
 BOLD = Arm("bold", learn, "toy", ToyConfig(step_size=0.5, diverging=(2,)), 15)
 ACROBOT = Arm(
     "Acrobot", reinforce, "Acrobot-v1", ReinforceConfig(max_episode_steps=300), 4, (0, 2, 4)
+)
+CAR = Arm(
+    "car",
+    reinforce,
+    "MountainCarContinuous-v0",
+    ReinforceConfig(
+        policy=Gaussian(learn_sigma=True, constant_feature=True),
+        biases=False,
+        epochs=1,
+        normalise="centre",
+        max_episode_steps=700,
+    ),
+    4,
+    (0, 2, 4),
 )
 quiet = {"progress": False}
 
@@ -86,7 +101,7 @@ def test_blocks_of_any_size_give_the_same_bits(tmp_path, block):
     assert_results_are(results, [PLAIN, BOLD], range(30))
 
 
-@pytest.mark.parametrize("arm", [BOLD, ACROBOT])
+@pytest.mark.parametrize("arm", [BOLD, ACROBOT, CAR])
 def test_a_seed_alone_gives_the_bits_it_has_among_thirty(tmp_path, arm):
     thirty = run([arm], seeds=range(30), store=tmp_path / "30", workers=1, block=30, **quiet)
     for seed in (2, 9):
@@ -102,7 +117,7 @@ def test_a_seed_alone_gives_the_bits_it_has_among_thirty(tmp_path, arm):
 
 @pytest.mark.parametrize("backend", ["loky", "threading", "multiprocessing"])
 def test_two_workers_give_the_same_bits(tmp_path, backend):
-    arms = [PLAIN, BOLD, ACROBOT]
+    arms = [PLAIN, BOLD, ACROBOT, CAR]
     results = run(arms, seeds=range(6), store=tmp_path, block=2, backend=backend, **quiet)
     assert_results_are(results, arms, range(6))
 
@@ -116,7 +131,7 @@ def test_dask_gives_the_same_bits(tmp_path):
         ) as cluster,
         Client(cluster),
     ):
-        arms = [PLAIN, BOLD, ACROBOT]
+        arms = [PLAIN, BOLD, ACROBOT, CAR]
         results = run(arms, seeds=range(6), store=tmp_path, backend="dask", block=2, **quiet)
     assert_results_are(results, arms, range(6))
 

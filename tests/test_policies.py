@@ -14,6 +14,7 @@ POLICIES = {
     "categorical": (Categorical(), 3, 0),
     "weights": (Gaussian(mean="weights", sigma=0.5), 0, 1),
     "weights and constant": (Gaussian(mean="weights", sigma=0.3, constant_feature=True), 0, 2),
+    "weights, learned sigma": (Gaussian(mean="weights", sigma=1.5, learn_sigma=True), 0, 2),
     "direct": (Gaussian(mean="direct", sigma=0.7, learn_sigma=True), 0, 1),
     "direct and constant": (Gaussian(mean="direct", sigma=2.0, constant_feature=True), 0, 3),
 }
@@ -193,7 +194,7 @@ def test_what_learns_and_what_does_not(learned, biases):
     np.testing.assert_allclose(np.exp(parameters[-2:]), 0.3, rtol=1e-6)
 
 
-@pytest.mark.parametrize("sigma", [0.0, -1.0, np.inf, np.nan, "wide"])
+@pytest.mark.parametrize("sigma", [0.0, -1.0, np.inf, np.nan, "wide", True])
 def test_sigma_out_of_range_is_refused(sigma):
     with pytest.raises(ValueError, match=r"sigma must be .* got"):
         Gaussian(sigma=sigma)
@@ -202,6 +203,13 @@ def test_sigma_out_of_range_is_refused(sigma):
 def test_an_unknown_form_of_the_mean_is_refused():
     with pytest.raises(ValueError, match="mean must be 'weights' or 'direct', got 'median'"):
         Gaussian(mean="median")
+
+
+@pytest.mark.parametrize("name", ["learn_sigma", "constant_feature"])
+@pytest.mark.parametrize("value", [1, 0, None, "yes", 0.5])
+def test_switches_that_are_no_bools_are_refused(name, value):
+    with pytest.raises(ValueError, match=rf"^{name} must be a bool, got "):
+        Gaussian(**{name: value})
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ from rl_core.dynamics import TASKS
 from rl_core.episodes import Trajectory, open_environment, spawn_streams
 from rl_core.policies import Categorical, Gaussian, make_policy
 from rl_core.reinforce import ReinforceConfig, discounted_returns, normalised
+from rl_core.rollouts import mean_actions, weights_of
 
 CONFIGS = {
     "Acrobot-v1": ReinforceConfig(max_episode_steps=700),
@@ -160,6 +161,14 @@ def test_returns_obey_their_recursion_and_their_moments(rewards, gamma):
         assert scaled.std() == pytest.approx(1)
 
 
+def test_returns_of_an_escape_by_hand():
+    """Every push costs a tenth of its square; the last step brings a hundred as well."""
+    forces = np.array([1.0, -2.0, 3.0])
+    rewards = -0.1 * forces**2 + np.array([0.0, 0.0, 100.0])
+    expected = [-0.1 + 0.9 * (-0.4 + 0.9 * 99.1), -0.4 + 0.9 * 99.1, 99.1]
+    np.testing.assert_allclose(discounted_returns(rewards, 0.9), expected)
+
+
 # Gradients
 
 
@@ -287,6 +296,60 @@ def test_one_episode_of_learning_is_adam_on_the_stated_gradient(batch_size):
     # Where a gradient is next to nothing, Adam makes much of how it was rounded.
     assert np.quantile(np.abs(found - expected), 0.95) < 2e-5
     assert np.abs(found - expected).max() < 0.1 * moved.max()
+
+
+@pytest.mark.parametrize(
+    ("distribution", "biases"),
+    [
+        (Gaussian(mean="weights", sigma=0.3), False),
+        (Gaussian(mean="weights", sigma=0.5, constant_feature=True), False),
+        (Gaussian(mean="weights", sigma=1.0, learn_sigma=True), True),
+        (Gaussian(mean="direct", sigma=0.5, learn_sigma=True, constant_feature=True), True),
+    ],
+)
+def test_one_episode_of_gaussian_learning_is_adam_on_the_stated_gradient(distribution, biases):
+    """The same weights from torch: `Normal.log_prob` of the raw actions, autograd, Adam."""
+    name, steps = "MountainCarContinuous-v0", 1000
+    config = dataclasses.replace(CONFIGS[name], policy=distribution, biases=biases)
+    config = dataclasses.replace(config, max_episode_steps=steps)
+    run = run_of(name, config, episodes=1, seeds=[1])
+    streams, environment = spawn_streams(1), open_environment(name)
+    environment.seed(streams.environment_seed)
+    policy = make_policy(distribution, (10, 20), 2, 0, 1)
+    parameters = policies.initial_parameters(policy, distribution, streams.network)
+    trajectory = Trajectory(2, 1)
+    environment.play(policy, parameters, streams.policy, steps, trajectory)
+    observations, actions, rewards = trajectory.first(steps)
+    returns = discounted_returns(rewards, 0.99)
+    weights = torch.from_numpy(returns - returns.mean()).float()
+    module = networks.to_torch(tuple(policy.sizes.tolist()), parameters[:-1])
+    log_sigma = torch.nn.Parameter(torch.from_numpy(parameters[-1:].copy()))
+    learning = [p for p in module.parameters() if biases or p.ndim > 1]
+    learning += [log_sigma] if distribution.learn_sigma else []
+    optimiser = torch.optim.Adam(learning, lr=config.learning_rate)
+    features = torch.from_numpy(observations)
+    if distribution.constant_feature:
+        features = torch.column_stack([features, torch.ones(steps)])
+    order = np.arange(steps)
+    streams.network.shuffle(order)
+    for batch in map(torch.from_numpy, (order[:512], order[512:])):
+        outputs = module(features[batch])
+        means = (outputs * features[batch]).sum(1) if distribution.mean == "weights" else outputs
+        normal = torch.distributions.Normal(means.reshape(-1, 1), log_sigma.exp())
+        taken = normal.log_prob(torch.from_numpy(actions)[batch])[:, 0]
+        optimiser.zero_grad()
+        (-(taken * weights[batch]).mean()).backward()
+        optimiser.step()
+    expected = np.concatenate([p.detach().numpy().ravel() for p in module.parameters()])
+    last = {name: array[0] for name, array in run.arrays.items() if "/" not in name}
+    assert last["log_sigma"] == pytest.approx(log_sigma.detach().numpy(), abs=2e-5)
+    assert (last["log_sigma"] != parameters[-1:]).all() == distribution.learn_sigma
+    _, found = networks.pack(last)
+    moved = np.abs(found - parameters[:-1])
+    assert moved.max() > 1e-3
+    # The terms of a sum nearly cancel, so that its rounding shows; Adam makes much of that.
+    assert np.median(np.abs(found - expected)) < 1e-5
+    assert np.quantile(np.abs(found - expected), 0.9) < 0.05 * moved.max()
 
 
 # What a run promises
@@ -473,6 +536,47 @@ def test_a_bandit_with_a_continuous_action_is_solved(mean):
     assert (np.exp(run.arrays["log_sigma"]) < 0.35).all()
 
 
+@pytest.mark.parametrize("mean", ["weights", "direct"])
+@pytest.mark.parametrize("limit", [1.0, np.inf])
+def test_a_bandit_with_two_action_dimensions_is_solved(mean, limit):
+    """The optimum is the same with bounds and without: nothing needs them."""
+    best = np.array([0.7, -0.6])
+
+    def bandit():
+        space = spaces.Box(-limit, limit, (2,))
+        return Bandit(space, lambda action: -((action - best) ** 2).sum())
+
+    config = ReinforceConfig(
+        policy=Gaussian(mean=mean, sigma=0.3, learn_sigma=False),
+        hidden=(8,),
+        learning_rate=2e-3,
+        epochs=1,
+        normalise="none",
+    )
+    run = run_of(bandit, config, episodes=3000, seeds=range(5))
+    for position in range(5):
+        weights = weights_of(run.arrays, position)
+        found = mean_actions(config, weights, np.ones((1, 1)))[0]
+        np.testing.assert_allclose(found, best, atol=0.25)
+
+
+def test_a_box_of_any_shape_gets_actions_of_that_shape():
+    taken = []
+
+    def reward(action):
+        taken.append(action)
+        return 0.0
+
+    def bandit():
+        return Bandit(spaces.Box(-np.inf, np.inf, (2, 3)), reward)
+
+    config = ReinforceConfig(policy=Gaussian(sigma=3.0), epochs=1)
+    run = run_of(bandit, config, episodes=50, seeds=[0])
+    assert {action.shape for action in taken} == {(2, 3)}
+    assert np.abs(taken).max() > 5.0
+    assert run.arrays["log_sigma"].shape == (1, 6)
+
+
 def test_the_reward_is_charged_on_the_unclipped_action():
     config = dataclasses.replace(
         CONFIGS["MountainCarContinuous-v0"], policy=Gaussian(sigma=4.0), max_episode_steps=400
@@ -503,6 +607,7 @@ def test_cart_pole_is_learned_through_the_plain_loop():
         ("gamma", -0.1),
         ("gamma", 1.1),
         ("gamma", np.nan),
+        ("gamma", True),
         ("gamma", "high"),
         ("hidden", (10, 0)),
         ("hidden", (10, -3)),
@@ -515,6 +620,7 @@ def test_cart_pole_is_learned_through_the_plain_loop():
         ("learning_rate", -1e-3),
         ("learning_rate", np.inf),
         ("learning_rate", np.nan),
+        ("learning_rate", True),
         ("batch_size", 0),
         ("batch_size", 1.5),
         ("epochs", 0),

@@ -95,6 +95,27 @@ def test_mean_actions_by_hand(mean, constant):
     np.testing.assert_allclose(found, expected, rtol=1e-6)
 
 
+def test_a_grid_covers_the_space_of_observations():
+    space = gymnasium.make("MountainCarContinuous-v0").observation_space
+    grid = rollouts.state_grid(space, 7)
+    assert grid.shape == (49, 2)
+    np.testing.assert_array_equal(grid.min(axis=0), space.low)
+    np.testing.assert_array_equal(grid.max(axis=0), space.high)
+    np.testing.assert_allclose(grid.reshape(7, 7, 2)[3, 3], (space.low + space.high) / 2, atol=1e-7)
+    assert len(np.unique(grid, axis=0)) == 49
+
+
+def test_a_grid_without_end_is_refused():
+    endless = gymnasium.make("CartPole-v1").observation_space.low.copy()
+    endless[1] = -np.inf
+    with pytest.raises(ValueError, match=r"space must be a Box with finite bounds.*, got Box"):
+        rollouts.state_grid(gymnasium.spaces.Box(endless, 5.0), 3)
+    with pytest.raises(ValueError, match=r"space must be a Box of one axis, got Discrete"):
+        rollouts.state_grid(gymnasium.spaces.Discrete(3), 3)
+    with pytest.raises(ValueError, match=r"points must be an integer from 2, got 1"):
+        rollouts.state_grid(gymnasium.spaces.Box(-1.0, 1.0, (2,)), 1)
+
+
 def test_rollouts_scatter_around_the_mean_action():
     run = reinforce.reinforce("MountainCarContinuous-v0", CONTINUOUS, episodes=1, seeds=[3])
     weights = rollouts.weights_of(run.arrays, 0)

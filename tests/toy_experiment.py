@@ -8,6 +8,7 @@ import pandas as pd
 from toy_learner import ToyConfig, learn
 
 from rl_core.experiments import Arm, Results, run
+from rl_core.policies import Gaussian
 from rl_core.reinforce import ReinforceConfig, reinforce
 
 SEEDS = [4, 0, 11, 7, 2, 30]
@@ -26,6 +27,16 @@ ARMS = {
             (0, 15),
         )
         for gamma in (0.9, 0.99)
+    ]
+    + [
+        Arm(
+            "Gaussian",
+            reinforce,
+            "MountainCarContinuous-v0",
+            ReinforceConfig(policy=Gaussian(learn_sigma=True), max_episode_steps=1000),
+            15,
+            (0, 15),
+        )
     ],
 }
 

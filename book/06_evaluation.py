@@ -1,0 +1,358 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#     notebook_metadata_filter: kernelspec,jupytext,mystnb
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#       format_version: '1.3'
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # Evaluation
+#
+# *Sections 3.3 and 3.4 of the report: how good are the agents, how should one measure it, and would a table have done?*
+#
+# **Question.** The report judges its agents by the steps they need, and says that this is the same as judging them by
+# their rewards. It judges them on the episodes they were trained on, without Gymnasium's time limits, one run each. What do the
+# same agents look like when all of them are tried out in the same way, and beside what others have published?
+# And was a neural network needed at all, or could the world have been cut into cells and the table of chapter 2
+# been used again?
+
+# %% tags=["hide-input"]
+from pathlib import Path
+
+import evaluation_figures as drawings
+import evaluation_study as study
+import numpy as np
+import pandas as pd
+from myst_nb import glue
+
+from rl_core import figures
+from rl_core.claims import details, record, verdicts
+
+figures.use_style()
+RESULTS = Path("../results")
+DATA = RESULTS / "figures"
+DATA.mkdir(parents=True, exist_ok=True)
+
+# %% [markdown]
+# ## Method
+#
+# A learning curve shows an agent while it changes. To know how good it is in the end, we stop learning
+# and let it play 100 fresh episodes, with every seed. The starts of these episodes come from a stream of random numbers that no
+# training has touched, and are the same for all agents trained with that seed. What we report is the mean over the
+# episodes of a seed, and then the median of these means over the seeds, with its 95% interval.
+#
+# The dynamics know nothing of time limits, and neither do our agents: they see a state, not a clock. So one
+# evaluation serves two readings. **Without a limit**, as in 2018, an episode goes on until the goal is reached; we stop it after
+# 5,000 steps, and count it with these. **Under Gymnasium's limit** (500 steps for Acrobot, 200 for MountainCar, 999
+# for MountainCarContinuous) the same episode is cut off there.
+#
+# Training is another matter. What an agent never sees it cannot learn from, so agents trained under the limits are arms
+# of their own (of at most 2,000 episodes). They learn from episodes that were cut off, too, since there may be no others.
+#
+# An agent can act **as learned**, drawing from the probabilities it has learned as it did in training; or be
+# **greedy**, and always take the action it holds best (for a continuous action: the mean). Agents that learn values are
+# greedy here.
+
+# %%
+pd.DataFrame(
+    [{"agent": arm.name, "environment": arm.env, "episodes": arm.episodes} for arm in study.arms()]
+).style.hide(axis="index")
+
+# %%
+results = study.learn(RESULTS / "store")
+episodes = study.evaluate_all(results)
+policies = study.by_seed(episodes)
+
+# %% tags=["remove-cell"]
+policies.to_csv(DATA / "table_6_1.csv", index=False)
+published = pd.read_csv("data/published.csv")
+glue("n-seeds", len(study.SEEDS), display=False)
+
+
+def chosen(name, agent, trained, acting):
+    rows = (policies[study.KEY] == [name, agent, trained, acting]).all(axis=1)
+    return policies[rows]
+
+
+for name, key in (
+    ("Acrobot", "acrobot"),
+    ("MountainCar", "car"),
+    ("MountainCarContinuous", "continuous"),
+):
+    free = chosen(name, "REINFORCE", "no limit", "as learned")
+    greedy = chosen(name, "REINFORCE", "no limit", "greedy")
+    under = chosen(name, "REINFORCE", "time limit", "as learned")
+    glue(f"{key}-reached", 100 * free["terminated"].mean(), display=False)
+    glue(f"{key}-greedy-reached", 100 * greedy["terminated"].mean(), display=False)
+    glue(f"{key}-in-time", 100 * free["limited_terminated"].mean(), display=False)
+    glue(f"{key}-under-in-time", 100 * under["limited_terminated"].mean(), display=False)
+    glue(f"{key}-under-reached", 100 * under["terminated"].mean(), display=False)
+
+# %% [markdown]
+# ## Every agent on every environment
+
+# %% tags=["hide-input"]
+figures.captioned(
+    study.summary(policies, "Acrobot"),
+    "Table 6.1. Acrobot. Steps and returns: median over seeds [95% interval] of the mean over 100 "
+    "episodes. Reached: share of episodes that get to the goal, within 5,000 steps and within the limit.",
+    formats={"reached (%)": "{:.0f}", "reached in time (%)": "{:.0f}"},
+)
+
+# %% tags=["hide-input"]
+figures.captioned(
+    study.summary(policies, "MountainCar"),
+    "Table 6.2. MountainCar, as Table 6.1.",
+    formats={"reached (%)": "{:.0f}", "reached in time (%)": "{:.0f}"},
+)
+
+# %% tags=["hide-input"]
+figures.captioned(
+    study.summary(policies, "MountainCarContinuous"),
+    "Table 6.3. MountainCarContinuous, as Table 6.1. The tables choose among three forces: −1, 0 and 1.",
+    formats={"reached (%)": "{:.0f}", "reached in time (%)": "{:.0f}"},
+)
+
+# %% [markdown]
+# The means of every agent and seed: {download}`table_6_1.csv <../results/figures/table_6_1.csv>`.
+
+# %% tags=["hide-input"] mystnb={"image": {"alt": "Three charts, one for each environment, with a line for each agent: dots for seeds, a mark for the median, a bar for its interval, and below a line the published returns."}}
+drawings.all_agents(policies, published)
+
+# %% [markdown]
+# :::{container} caption
+# **Figure S6.1.** Return under Gymnasium's time limits, higher is better. Dots: seeds. Marks: their median; bars: its 95% interval. "limit":
+# trained under the limit as well. Diamonds: published results (Table 6.4). Data:
+# {download}`CSV <../results/figures/table_6_1.csv>`.
+# :::
+#
+# Three things stand out.
+#
+# **Noise is part of the policy.** As learned, REINFORCE gets to Acrobot's goal in {glue:text}`acrobot-reached:.0f`% of all episodes.
+# Greedy, the same networks do so in {glue:text}`acrobot-greedy-reached:.0f`%; on MountainCar it is {glue:text}`car-reached:.0f`% and {glue:text}`car-greedy-reached:.0f`%. A greedy
+# pendulum that pushes the same way in every state near the bottom only sways about a tilted rest, held there by its own
+# push, for ever. In training this cannot happen, because now and then a random action shakes it loose. REINFORCE optimises the
+# policy *with* its noise, and has no reason to make the one without it work. Reporting the greedy policy, as is
+# customary, would report an agent that nobody trained.
+#
+# **What time limits do to training.** MountainCar's limit is 200 steps, and a random car hardly ever gets out of the valley
+# in 200 steps. So all episodes look alike, each is cut off with a return of −200, and there is nothing to prefer. Trained under the limit REINFORCE
+# reaches the goal in time in {glue:text}`car-under-in-time:.0f`% of the episodes; trained without, in {glue:text}`car-in-time:.0f`%. On
+# Acrobot the limit is milder, {glue:text}`acrobot-under-in-time:.0f`% against {glue:text}`acrobot-in-time:.0f`%: a random pendulum gets
+# there within it often enough. That the report left the limits out is not a detail. It is what made its results possible on MountainCar.
+#
+# **What time limits do to evaluation.** A mean of a few hundred steps without a limit is a good agent on a bad day. Under a limit of
+# 200 it counts as a failure, and returns no longer tell it from one that sits still.
+#
+# ### Beside published results
+
+# %% tags=["hide-input"]
+figures.captioned(
+    published.drop(columns="address").assign(environment=published["environment"].str[:-3]),
+    "Table 6.4. Published returns under Gymnasium's time limits.",
+    formats={"return": "{:.1f}", "spread": "{:.1f}", "steps trained": "{:,.0f}"},
+)
+
+# %% [markdown]
+# The sources are the benchmark of the
+# [RL Baselines3 Zoo](https://github.com/DLR-RM/rl-baselines3-zoo/blob/master/benchmark.md) and the documentation of
+# [CleanRL](https://docs.cleanrl.dev/rl-algorithms/dqn/) (the numbers: {download}`CSV <data/published.csv>`). They
+# are not measured like ours, in five ways:
+#
+# - They trained under the time limits, ours (but for the arms that say so) without.
+# - The Zoo tuned its settings for each environment. The report's are the same for nearly everything, and CleanRL's are one set for
+#   all classic environments.
+# - The Zoo shows one run, "not a quantitative benchmark" in its own words; CleanRL the mean of three; we the median of {glue:text}`n-seeds`.
+# - The Zoo evaluates the greedy policy in more than 600 fresh episodes, and its spread is over episodes. CleanRL averages returns
+#   of training, exploration included, and its spread is over runs. Our intervals are about the median over seeds.
+# - Networks are larger (256 × 256, or 120 × 84, units against 10 × 20), and what is learned from is the reward as paid, where
+#   the report's DQN learns from shaped rewards.
+#
+# On MountainCar the two published DQNs are a hundred steps apart. The difference is tuning, not the algorithm.
+#
+# ## Steps or return?
+#
+# The report measures steps to completion, and calls this equivalent to the undiscounted return, "since both models output uniform rewards
+# before termination". Both models are Acrobot and MountainCar. We take every policy of the tables above, one for each agent and
+# seed, rank them by their mean steps and by their mean return, without limit, and ask whether the two rankings agree
+# (Kendall's τ: 1 if all pairs are in the same order, −1 if all are in the opposite one).
+
+# %% tags=["hide-input"]
+by_hand = study.gentle((1.0, 0.8, 0.6, 0.4, 0.3, 0.2))
+columns = [*study.KEY, "seed", "steps", "return", "shaped_return"]
+policies[columns].to_csv(DATA / "figure_s6_2.csv", index=False)
+agreements = study.agreements(policies)
+apart = agreements.set_index(["environment", "rewards"])["pairs apart (%)"]
+glue("apart", float(apart["MountainCarContinuous", "as paid"]), display=False)
+for which, row in (("hard", by_hand.iloc[0]), ("soft", by_hand.iloc[-1])):
+    for column in ("force", "steps", "return"):
+        glue(f"{which}-{column}", float(row[column]), display=False)
+figures.captioned(
+    agreements,
+    "Table 6.5. Do fewest steps and highest return rank the policies the same? Interval: 95%, over "
+    "seeds. Pairs apart: those that the two order differently. Shaped: the rewards that chapter 4's "
+    "DQN learns from, for the networks only.",
+    formats={"pairs apart (%)": "{:.2f}"},
+)
+
+# %% tags=["hide-input"] mystnb={"image": {"alt": "Scatter charts of return against mean steps. On Acrobot and MountainCar all policies lie on one falling curve. On MountainCarContinuous they form a cloud, with hand-made gentle drivers up and to the right. On the right, shaped returns rise with the steps on MountainCar."}}
+drawings.steps_and_returns(policies, by_hand)
+
+# %% [markdown]
+# :::{container} caption
+# **Figure S6.2.** Every policy a dot: its mean steps and its mean return, as paid (left) and shaped (right). Where dots lie on one
+# falling line, both rank alike. Data: {download}`CSV <../results/figures/figure_s6_2.csv>`.
+# :::
+#
+# **On MountainCar it is an identity.** Every step costs 1, so the return is the number of steps with a minus sign,
+# whether an episode ends or is cut off. **On Acrobot it nearly is.** The last step is free, so the return is the number of steps minus the share of episodes
+# that end, with a minus sign. Two policies can only change places if they are less than one step apart and end different shares of
+# their episodes.
+#
+# **On MountainCarContinuous it is not,** and {glue:text}`apart:.0f`% of all pairs are ordered differently. Reaching the goal pays 100 whenever it
+# happens, and force is what costs. A car that never moves has a return of 0 and the most steps there are; one that
+# tries and fails does worse in return and no worse in steps. And patience pays: drive by hand, always pushing the way the car
+# moves. With force {glue:text}`hard-force:.1f` this takes {glue:text}`hard-steps:.0f` steps and returns {glue:text}`hard-return:.1f`. With force
+# {glue:text}`soft-force:.1f` it takes {glue:text}`soft-steps:.0f` steps and returns {glue:text}`soft-return:.1f`. There is no friction, so ever less force still gets there, ever later, and the return
+# tends to 100: without a time limit there is no best policy at all. The report's section 4 goes on counting steps, and so
+# measures something its agent was not trained for.
+#
+# **With shaped rewards even the direction can be wrong.** The report's shaped reward for MountainCar, the distance from the valley's middle, is
+# positive everywhere. Summed up without discount it is more, the longer an episode lasts. Shaping made learning easy in chapter 4; as a measure of success it
+# would be absurd.
+#
+# ## Or discretise the world?
+#
+# Section 3.4 names the alternative to function approximation: cut the world into cells and use a table. The report did not try. Here each
+# of the numbers that the agent sees is sorted into $n$ bins of equal width, a continuous force becomes one of three, and the
+# Q-learning of chapter 2 runs on the cells, with $\gamma = 0.99$, step size 0.3 and 2,000 episodes. At first all actions are random, after 500 episodes 2% of
+# them. (These settings were chosen on other seeds. An episode of training is stopped after 3,000 steps.)
+#
+# To see how much a table loses we need to know what can be had. Both cars obey a known law without chance, so
+# planning can tell: put a fine grid over position and speed, take the state after each push as a mixture of the four grid points around it, and run
+# chapter 1's value iteration. That gives one estimate. Then let the plan drive the true car: that takes whole
+# steps which are possible, so it can only be above the optimum.
+
+# %% tags=["hide-input"]
+optima = study.optima()
+fewest = {name: float(grids[-1].driven.mean()) for name, grids in optima.items()}
+for name, grids in optima.items():
+    glue(f"fewest-{name}", fewest[name], display=False)
+    gap = abs(float(grids[-1].planned.mean()) - fewest[name])
+    glue(f"gap-{name}", gap, display=False)
+refinement = study.refinement(optima)
+refinement.to_csv(DATA / "table_6_6.csv", index=False)
+figures.captioned(
+    refinement,
+    "Table 6.6. The fastest way up, mean over 401 starts between −0.6 and −0.4, planned on finer and "
+    "finer grids. Fewest, most: over the starts, as driven.",
+    formats={"steps by the values": "{:.2f}", "steps as driven": "{:.2f}"},
+)
+
+# %% [markdown]
+# On the finest grid the two differ by {glue:text}`gap-MountainCar:.2f` steps (MountainCar) and {glue:text}`gap-MountainCarContinuous:.2f` (MountainCarContinuous), and hardly move any more. So the optimum is
+# {glue:text}`fewest-MountainCar:.1f` and {glue:text}`fewest-MountainCarContinuous:.1f` steps, to within that. (The data: {download}`CSV <../results/figures/table_6_6.csv>`.)
+
+# %% tags=["remove-cell"]
+cars = ("MountainCar", "MountainCarContinuous")
+costs = {name: study.costs(results, policies, name) for name in cars}
+pd.concat(costs.values()).to_csv(DATA / "figure_s6_3.csv", index=False)
+network = {name: study.training(results, f"{name}, REINFORCE")[0] for name in cars}
+for name, table in costs.items():
+    medians = table.groupby("bins")["steps"].median()
+    glue(f"best-bins-{name}", int(medians.idxmin()), display=False)
+    glue(f"best-steps-{name}", float(medians.min()), display=False)
+    glue(f"above-{name}", float(100 * (medians.min() / fewest[name] - 1)), display=False)
+    in_study = table[table["bins"] == study.BEST_BINS]
+    glue(f"training-{name}", float(in_study["training_steps"].median() / 1e6), display=False)
+    glue(f"network-{name}", float(np.median(network[name]) / 1e6), display=False)
+worst = costs["MountainCarContinuous"].query("bins == bins.max()")["steps"]
+glue("stuck", int((worst >= study.CAP).sum()), display=False)
+glue("cells", study.ACROBOT_BINS**6, display=False)
+glue("car-cells", study.BEST_BINS**2, display=False)
+
+# %% tags=["hide-input"] mystnb={"image": {"alt": "Four charts. Above, steps of the greedy table against the number of bins for both cars: many with 5 bins, fewest with 10 to 40, more again with 80; the network's and the fastest possible as horizontal lines. Below, environment steps of training."}}
+drawings.bins(costs, policies, fewest, network)
+
+# %% [markdown]
+# :::{container} caption
+# **Figure S6.3.** What bins bring and cost. Above: steps that the greedy table needs after training; dots are seeds, the line their
+# median with its 95% interval. Below: environment steps that training took; dashed, the network's. Data:
+# {download}`CSV <../results/figures/figure_s6_3.csv>`.
+# :::
+#
+
+# %% tags=["hide-input"]
+figures.captioned(
+    study.by_bins(costs, fewest),
+    "Table 6.7. The greedy table against the number of bins: steps to the goal, median over seeds "
+    "[95% interval]; how far the median is above the fastest way; seeds that need more than 500 "
+    "steps on average; and, as medians, the steps of training and the share of entries they visited.",
+    formats={
+        "above the fastest": "{:,.0f}",
+        "training steps (10⁶)": "{:.2f}",
+        "entries visited (%)": "{:.0f}",
+    },
+)
+
+# %% [markdown]
+# Too few bins, and states that call for different actions share a cell: the greedy car may rock in the valley for ever. Too many,
+# and each cell has to be learned anew from its own few visits; nothing is carried over to the cell next to it. In between, a table does well:
+# on MountainCar {glue:text}`best-bins-MountainCar` bins come to {glue:text}`best-steps-MountainCar:.0f` steps, {glue:text}`above-MountainCar:.0f`% above the optimum; on MountainCarContinuous
+# {glue:text}`best-bins-MountainCarContinuous` bins come to {glue:text}`best-steps-MountainCarContinuous:.0f`, {glue:text}`above-MountainCarContinuous:.0f`% above. With {glue:text}`car-cells` cells the training took
+# {glue:text}`training-MountainCar:.1f` and {glue:text}`training-MountainCarContinuous:.1f` million steps; the network's {glue:text}`network-MountainCar:.1f` and {glue:text}`network-MountainCarContinuous:.1f` million.
+#
+# With 80 bins on MountainCarContinuous {glue:text}`stuck` of {glue:text}`n-seeds` seeds never reach the goal in evaluation. Force costs, so
+# all values of pushing fall below the 0 of doing nothing, and if the 100 at the goal has not spread far enough by the time
+# exploration fades, the car learns to stand still.
+#
+# The catch is the number of dimensions. Acrobot shows six numbers. Six bins for each make {glue:text}`cells:,` cells, most of
+# them impossible, since a sine and a cosine belong together. Table 6.1 has what the table makes of that.
+#
+# ## How long it took
+
+# %% tags=["hide-input"]
+figures.captioned(
+    study.times(results),
+    "Table 6.8. Seconds for one run, in the report (its machine unknown) and now: a seed's share of a "
+    "block on one core, median over seeds.",
+    formats={
+        "2018 (s)": "{:.0f}",
+        "now (s)": "{:.1f}",
+        "then / now": "{:.1f}",
+        "environment steps now": "{:,}",
+    },
+)
+
+# %% [markdown]
+# The machines differ, so a ratio is no measure of the programs. What can be said is whether the report's times are enough for its runs. Two
+# remarks. Seeds are trained in blocks, and a seed's time is its share, so that the intervals below are about two
+# blocks, not about {glue:text}`n-seeds` independent measurements. And the report's times go with the runs it plotted, each of which learned at once; a
+# seed that uses up its budget takes longer.
+#
+# ## Verdicts
+#
+# The criteria stand in `book/evaluation_study.py` and were fixed before the runs with seeds 0 to 29. Intervals are 95%
+# bootstrap intervals over seeds.
+
+# %%
+findings = study.findings(results, policies)
+record(findings, RESULTS, chapter="6")
+figures.captioned(verdicts(findings), "Table 6.9. The report's claims about evaluation.")
+
+# %% tags=["hide-input"]
+figures.captioned(details(findings), "Table 6.10. Each criterion with its evidence.")
+
+# %% [markdown]
+# **What to take along.** Steps and returns are two names for one thing only while every step costs the same. Say under which time limit an
+# agent was trained, under which it was evaluated, and with how much of its noise: each of the three can turn a success into a
+# failure. And before reaching for a network, count the dimensions. In two of them the table of chapter 2 is a strong
+# opponent; in six it is not.

@@ -1,0 +1,75 @@
+"""Chapter 5: what becomes of seeds that do not learn, and how far noise alone gets."""
+
+import numpy as np
+import pandas as pd
+from continuous_study import ENV, EXTREME, VARIANTS, Curves
+from seeds import SEEDS
+
+from rl_core.experiments import Results
+from rl_core.policies import Gaussian
+from rl_core.reinforce import ReinforceConfig
+from rl_core.rollouts import rollout
+
+FATES = (
+    "learned",
+    "still slow",
+    "never out",
+    "out, then idle",
+    "out, then pressing",
+)
+
+
+def fates(curves: Curves, arm: str, log_sigma: np.ndarray) -> list[str]:
+    """What became of each seed.
+
+    A seed that ended in an episode of more than 100,000 steps is stuck. What its policy does there
+    follows from the cost: a step costs 0.1 (mu^2 + sigma^2) on average. It idles if the root mean
+    square of mu is at most half the engine's force, and presses if it is more.
+
+    Parameters
+    ----------
+    curves : Curves
+    arm : str
+    log_sigma : array of shape (seeds, 1)
+        As the run ended with it.
+    """
+    found = []
+    for position, (seed, good) in enumerate(zip(SEEDS, curves.learned(arm), strict=True)):
+        rows = curves.rows[arm]
+        rows = rows[rows["seed"] == seed]
+        stopped = rows[~rows["terminated"] & (rows["steps"] > EXTREME)]
+        if good:
+            found.append("learned")
+        elif stopped.empty or rows["terminated"].iloc[-1]:
+            found.append("still slow")
+        elif not rows["terminated"].any():
+            found.append("never out")
+        else:
+            last, sigma = stopped.iloc[-1], np.exp(float(log_sigma[position, 0]))
+            push = -10 * last["return"] / last["steps"] - sigma**2
+            found.append("out, then idle" if push <= 0.5**2 else "out, then pressing")
+    return found
+
+
+def fate_table(curves: Curves, results: Results) -> pd.DataFrame:
+    """Seeds of each arm by what became of them."""
+    rows = []
+    for arm in VARIANTS:
+        names = fates(curves, arm, results.arrays(arm)["log_sigma"])
+        rows.append({"arm": arm, **{fate: names.count(fate) for fate in FATES}})
+    return pd.DataFrame(rows)
+
+
+def noise_alone(sigma: float, episodes: int = 100, max_steps: int = 200_000) -> np.ndarray:
+    """Steps to the goal for a mean of zero and noise of standard deviation sigma.
+
+    Infinite where the car was not out after `max_steps`.
+    """
+    settings = ReinforceConfig(hidden=(), policy=Gaussian(mean="direct", sigma=sigma))
+    weights = {
+        "layer0.weight": np.zeros((2, 1), np.float32),
+        "log_sigma": np.full(1, np.log(sigma), np.float32),
+    }
+    rng = np.random.default_rng(np.random.SeedSequence(2022))
+    played = [rollout(ENV, settings, weights, rng, max_steps) for _ in range(episodes)]
+    return np.array([len(one.rewards) if one.terminated else np.inf for one in played])

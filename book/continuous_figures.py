@@ -1,0 +1,249 @@
+"""Chapter 5: learning curves, fates of seeds, the trade-off around sigma, the mean action."""
+
+from collections.abc import Mapping, Sequence
+
+import gymnasium as gym
+import numpy as np
+import pandas as pd
+from continuous_fates import FATES
+from continuous_study import (
+    CONVERGED,
+    EARLY,
+    ENV,
+    EPISODES,
+    LEARNED,
+    SIGMAS,
+    SWEEPS,
+    Curves,
+)
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from seeds import SEEDS
+
+from rl_core.figures import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    GREEN,
+    GREY,
+    LINES,
+    ORANGE,
+    SKY_BLUE,
+    VERMILLION,
+    label,
+)
+from rl_core.reinforce import ReinforceConfig
+from rl_core.rollouts import Weights, mean_actions, state_grid
+from rl_core.statistics import bootstrap_interval
+
+EVERY = 10  # episodes between drawn points
+
+
+def _middle(axes: Axes, x: np.ndarray, seeds: np.ndarray, text: str, colour: str, line) -> None:
+    """Median over seeds with its interval."""
+    rng = np.random.default_rng(np.random.SeedSequence(2020))
+    middle, low, high = bootstrap_interval(seeds, rng=rng, resamples=2_000)
+    axes.fill_between(x, low, high, color=colour, alpha=0.22, lw=0)
+    axes.plot(x, middle, color=colour, ls=line, label=text)
+
+
+def curve_data(curves: Curves, arms: Sequence[str]) -> pd.DataFrame:
+    """What the curves are drawn from: each seed's median of the last 100 episodes, every tenth."""
+    tables = []
+    for arm in arms:
+        good = dict(zip(SEEDS, curves.learned(arm), strict=True))
+        smooth = pd.DataFrame(curves.smooth[arm].T, columns=list(SEEDS))
+        smooth.insert(0, "episode", np.arange(1, EPISODES + 1))
+        drawn = smooth[smooth["episode"] % EVERY == 0]
+        long = drawn.melt("episode", var_name="seed", value_name="steps").dropna()
+        tables.append(long.assign(arm=arm, learned=long["seed"].map(good)))
+    return pd.concat(tables, ignore_index=True)
+
+
+def learning_curve(curves: Curves, arm: str, original: pd.DataFrame) -> Figure:
+    """Steps an episode of every seed, where each stopped, and the curve of 2018."""
+    figure, axes = plt.subplots(figsize=(6.4, 4.6))
+    drawn = (original["episode"], original["low"], original["high"])
+    name = "2018 original, one run"
+    axes.fill_between(*drawn, color="#c9b458", alpha=0.75, lw=0, label=name)
+    x = np.arange(EVERY, EPISODES + 1, EVERY)
+    good, smooth = curves.learned(arm), curves.smooth[arm]
+    for steps, learned in zip(smooth, good, strict=True):
+        style = {"color": GREY, "ls": "-"} if learned else {"color": BLACK, "ls": ":"}
+        axes.plot(x, steps[x - 1], lw=0.6, **style)
+        last = np.flatnonzero(np.isfinite(steps))[-1]
+        if last + 1 < EPISODES:
+            axes.plot(last + 1, steps[last], "x", color=VERMILLION, ms=6, clip_on=False)
+    axes.plot([], [], color=GREY, ls="-", lw=0.8, label=f"{good.sum()} seeds that learned")
+    missed = f"{(~good).sum()} that did not (×: budget used up)"
+    axes.plot([], [], color=BLACK, ls=":", lw=0.8, marker="x", mec=VERMILLION, label=missed)
+    if good.any():
+        text = "median of those that learned, 95% interval"
+        _middle(axes, x, smooth[good][:, x - 1], text, BLUE, "-")
+    axes.axhline(200, color=GREY, lw=0.8, ls="--")
+    axes.text(EPISODES, 195, "200, the report's number", ha="right", va="top", fontsize=8)
+    axes.set_yscale("log")
+    label(axes, x="episode", y="steps to the goal (log scale)")
+    axes.legend(fontsize=9, loc="upper right")
+    plt.close(figure)
+    return figure
+
+
+def variants(curves: Curves, names: Mapping[str, str]) -> Figure:
+    """Median and interval of those seeds of each arm that learned."""
+    figure, axes = plt.subplots(figsize=(6.4, 4.8))
+    x = np.arange(EVERY, EPISODES + 1, EVERY)
+    for (arm, text), colour, line in zip(names.items(), COLOURS, LINES, strict=False):
+        good = curves.learned(arm)
+        text = f"{text} ({good.sum()} of {len(SEEDS)} learned)"
+        if good.any():
+            _middle(axes, x, curves.smooth[arm][good][:, x - 1], text, colour, line)
+        else:
+            axes.plot([], [], color=colour, ls=line, label=text)
+    axes.set_yscale("log")
+    label(axes, x="episode", y="steps to the goal (log scale)")
+    figure.legend(loc="outside lower center", ncols=2, fontsize=9)
+    plt.close(figure)
+    return figure
+
+
+def fate_bars(table: pd.DataFrame) -> Figure:
+    """Seeds of every arm by what became of them."""
+    figure, axes = plt.subplots(figsize=(6.4, 4.8))
+    looks = (
+        (BLUE, ""),
+        (SKY_BLUE, "//"),
+        ("#bbbbbb", ""),
+        (ORANGE, "\\\\"),
+        (VERMILLION, "xx"),
+    )
+    left = np.zeros(len(table))
+    for fate, (colour, hatch) in zip(FATES, looks, strict=True):
+        counts = table[fate].to_numpy()
+        bars = axes.barh(
+            *(table["arm"], counts),
+            left=left,
+            color=colour,
+            hatch=hatch,
+            edgecolor="white",
+            label=fate,
+        )
+        axes.bar_label(
+            bars,
+            [str(n) if n else "" for n in counts],
+            label_type="center",
+            fontsize=9,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85},
+        )
+        left += counts
+    axes.invert_yaxis()
+    axes.grid(visible=False)
+    label(axes, x="seeds", y="")
+    figure.legend(loc="outside lower center", ncols=3, fontsize=9)
+    plt.close(figure)
+    return figure
+
+
+PANELS = {
+    "early": (f"mean length of the first {EARLY}\nepisodes (steps, all seeds)", "log"),
+    "learned": (f"share of seeds that learn\n(at most {LEARNED} steps at the end)", "linear"),
+    "episodes": (f"episodes until {CONVERGED} steps\n(seeds that learned)", "linear"),
+    "steps": ("steps at episode 5,000\n(seeds that learned)", "linear"),
+    "spread": ("interquartile range of steps,\nlast 500 (seeds that learned)", "linear"),
+    "return": ("return at episode 5,000\n(seeds that learned)", "linear"),
+}
+
+
+def tradeoff(table: pd.DataFrame) -> Figure:
+    """Six measures against sigma, with intervals."""
+    figure, panels = plt.subplots(2, 3, figsize=(9, 6.4))
+    places = np.arange(len(SIGMAS))
+    series = [
+        ("two observations", SWEEPS["two observations"], places, BLUE, "o-"),
+        ("two observations and a constant", SWEEPS["and a constant"], places, VERMILLION, "s--"),
+        ("σ learned, from 0.5 on", ("sigma learned",), places[-1:] + 1, GREEN, "D"),
+    ]
+    for axes, (measure, (text, scale)) in zip(panels.flat, PANELS.items(), strict=True):
+        rows = table[table["measure"] == measure].set_index("arm")
+        axes.set_yscale(scale)
+        finite = rows[["estimate", "low", "high"]].replace([np.inf, -np.inf], np.nan)
+        top, bottom = finite.max(axis=None), finite.min(axis=None)
+        top = top * 2 if scale == "log" else top + 0.12 * (top - bottom)
+        for shift, (name, arms, x, colour, mark) in zip((-0.08, 0.08, 0), series, strict=True):
+            estimate, low, high = (rows.loc[list(arms), c].to_numpy() for c in rows.columns[1:])
+            middle = np.where(np.isinf(estimate), np.nan, estimate)
+            axes.plot(x + shift, middle, mark, color=colour, ms=5, label=name)
+            ends = (np.where(np.isinf(low), np.nan, low), np.where(np.isinf(high), top, high))
+            axes.vlines(x + shift, *ends, color=colour, lw=1.4)
+            beyond = np.isinf(high)
+            axes.plot(x[beyond] + shift, np.full(beyond.sum(), top), "^", color=colour, ms=6)
+        axes.set_xticks([*places, len(places)], [*map(str, SIGMAS), "learned"])
+        axes.set_xlim(-0.4, len(places) + 0.4)
+        axes.set_title(text, fontsize=9)
+        axes.set_xlabel("σ")
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    plt.close(figure)
+    return figure
+
+
+def escapes(steps: Mapping[float, np.ndarray], max_steps: int) -> Figure:
+    """How likely noise alone is out of the valley within so many steps."""
+    figure, axes = plt.subplots()
+    for (sigma, taken), colour, line in zip(steps.items(), COLOURS, LINES, strict=False):
+        x = np.append(np.sort(taken[np.isfinite(taken)]), max_steps)
+        y = np.append(np.arange(1, len(x)), len(x) - 1) / len(taken)
+        axes.step(np.append(100, x), np.append(0, y), where="post", color=colour, ls=line)
+        axes.plot([], [], color=colour, ls=line, label=f"σ = {sigma}")
+        spent = 1_000 / sigma**2  # steps after which 0.1 sigma^2 a step has eaten the 100
+        axes.plot(spent, 0, "v", color=colour, ms=9, clip_on=False, zorder=5)
+    axes.set_xscale("log")
+    axes.set_ylim(0, 1)
+    label(axes, x="steps (log scale)", y="share of episodes that are out")
+    axes.plot([], [], "v", color=GREY, label="the noise has cost 100")
+    axes.legend(loc="upper left")
+    plt.close(figure)
+    return figure
+
+
+def mean_action_maps(
+    config: ReinforceConfig, rows: Mapping[str, Mapping[str, Weights]], points: int = 121
+) -> tuple[Figure, pd.DataFrame]:
+    """The mean action over position and velocity, a row an agent and a column a moment.
+
+    Returns the figure and its data.
+    """
+    space = gym.make(ENV).observation_space
+    grid = state_grid(space, points)
+    n_columns = max(len(moments) for moments in rows.values())
+    figure, panels = plt.subplots(
+        *(len(rows), n_columns), figsize=(9, 2.1 + 2.3 * len(rows)), sharex=True, sharey=True
+    )
+    tables = []
+    for line, (agent, moments) in zip(np.atleast_2d(panels), rows.items(), strict=True):
+        for axes, (moment, weights) in zip(line, moments.items(), strict=True):
+            means = mean_actions(config, weights, grid).reshape(points, points).T
+            extent = (space.low[0], space.high[0], space.low[1], space.high[1])
+            picture = axes.imshow(
+                means,
+                origin="lower",
+                aspect="auto",
+                extent=extent,
+                cmap="PuOr",
+                vmin=-1,
+                vmax=1,
+            )
+            if means.min() < 0 < means.max():
+                shape = np.linspace(*extent[:2], points), np.linspace(*extent[2:], points)
+                axes.contour(*shape, means, levels=[0], colors=BLACK, linewidths=0.8)
+            axes.axvline(-np.pi / 6, color=GREY, lw=0.7, ls=":")
+            axes.grid(visible=False)
+            axes.set_title(f"{agent}\n{moment}", fontsize=9)
+            table = pd.DataFrame(grid, columns=["position", "velocity"])
+            tables.append(table.assign(agent=agent, moment=moment, mean_action=means.T.ravel()))
+        line[0].set_ylabel("velocity (per step)")
+    for axes in np.atleast_2d(panels)[-1]:
+        axes.set_xlabel("position")
+    figure.colorbar(picture, ax=panels, label="mean action (force, clipped to ±1)", extend="both")
+    plt.close(figure)
+    return figure, pd.concat(tables, ignore_index=True)

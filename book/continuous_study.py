@@ -1,0 +1,399 @@
+"""Chapter 5: the arms of continuous REINFORCE, what the report claims, and how it is measured.
+
+The report counts three state features where MountainCarContinuous shows two numbers. Both readings
+are arms: the two observations alone, and with a constant as the third. "as reported" takes the
+first, because on seeds 1000 to 1029 more of its seeds learned (10 against 6 of 30).
+
+The cap on an episode and the budget keep a seed that does not get out from running for ever. They
+were chosen on the same seeds: from its first success on, no seed that learned needed more than
+250,000 steps for an episode, and none needed more than the budget besides its stopped episodes.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from seeds import SEEDS
+
+from rl_core.arm import Arm
+from rl_core.claims import Claim, Criterion, Evidence, Finding
+from rl_core.experiments import Results, run
+from rl_core.policies import Gaussian
+from rl_core.reinforce import ReinforceConfig, reinforce
+from rl_core.statistics import (
+    Interval,
+    bootstrap_interval,
+    episodes_to_threshold,
+    learned,
+    learning_curves,
+    probability_of_improvement,
+    proportion_interval,
+)
+
+ENV = "MountainCarContinuous-v0"
+EPISODES = 5_000
+BUDGET = 4_000_000  # environment steps a seed
+CAP = 500_000  # steps an episode; a capped episode is not learned from
+WINDOW = 100  # episodes; "at episode k" is a seed's median over the last 100 up to k
+LEARNED = 500  # steps; a seed that learned needs at most so many in the last 100 episodes
+CONVERGED = 300  # steps: half as many again as the report's 200
+EARLY = 10  # episodes
+EXTREME = 100_000  # steps: an episode that lasts "extremely long"
+MILESTONES = (1_000, 3_000, 5_000)
+SNAPSHOTS = (100, 1_000)
+REPORTED_MINUTES = 3
+
+VARIANTS = {
+    "as reported": ({}, {}),
+    "sigma 0.5": ({"sigma": 0.5}, {}),
+    "sigma 1": ({"sigma": 1.0}, {}),
+    "sigma learned": ({"sigma": 0.5, "learn_sigma": True}, {}),
+    "gamma 0.9": ({}, {"gamma": 0.9}),
+    "gamma 0.9, sigma 0.5": ({"sigma": 0.5}, {"gamma": 0.9}),
+    "three features": ({"constant_feature": True}, {}),
+    "three features, sigma 0.5": ({"constant_feature": True, "sigma": 0.5}, {}),
+    "three features, sigma 1": ({"constant_feature": True, "sigma": 1.0}, {}),
+    "mean direct, sigma 0.5": ({"mean": "direct", "sigma": 0.5}, {}),
+    "returns scaled": ({}, {"normalise": "standard"}),
+    "returns raw": ({}, {"normalise": "none"}),
+}
+SWEEPS = {
+    "two observations": ("as reported", "sigma 0.5", "sigma 1"),
+    "and a constant": tuple(f"three features{s}" for s in ("", ", sigma 0.5", ", sigma 1")),
+}
+SIGMAS = (0.3, 0.5, 1.0)
+"""The standard deviations of a sweep's arms."""
+
+
+def config(variant: str) -> ReinforceConfig:
+    """The settings of 2018 with the changes of a variant."""
+    policy, changes = VARIANTS[variant]
+    settings = {
+        "gamma": 0.99,
+        "hidden": (10, 20),
+        "biases": False,
+        "policy": Gaussian(**{"mean": "weights", "sigma": 0.3, **policy}),
+        "learning_rate": 2e-3,
+        "batch_size": 512,
+        "epochs": 1,
+        "normalise": "centre",
+        "max_episode_steps": CAP,
+        "max_env_steps": BUDGET,
+        "learn_from_capped": False,
+    }
+    return ReinforceConfig(**{**settings, **changes})
+
+
+def arms() -> list[Arm]:
+    """Every variant, 5,000 episodes."""
+    return [Arm(name, reinforce, ENV, config(name), EPISODES, SNAPSHOTS) for name in VARIANTS]
+
+
+def learn(store: Path) -> Results:
+    """Run what the store does not have; the rest is read."""
+    return run(arms(), seeds=SEEDS, store=store)
+
+
+CLAIMS = (
+    Claim(
+        "4a",
+        "4.1.2",
+        "MountainCarContinuous, REINFORCE: about 200 steps an episode after 3,000 episodes.",
+        (
+            Criterion("steps at episode 3,000, median over all seeds, 150 to 250", 150, 250),
+            Criterion("the same over the seeds that learned by then", 150, 250),
+        ),
+        "Figure 14",
+    ),
+    Claim(
+        "4b",
+        "4.1.2",
+        "Gamma 0.99 converges faster and better than 0.9.",
+        tuple(
+            Criterion(
+                f"sigma {sigma}: probability that a seed with 0.99 {what} than one with 0.9, "
+                "above 0.5",
+                at_least=0.5,
+            )
+            for sigma in (0.3, 0.5)
+            for what in (
+                "needs fewer steps at episode 5,000",
+                "gets to 300 steps in fewer episodes",
+            )
+        ),
+        "Figure S5.4",
+    ),
+    Claim(
+        "4c",
+        "4.1.3",
+        "Sigma 1: easier to get out early, slower convergence, noisier steps.",
+        (
+            Criterion(
+                "easier: probability that a seed with sigma 1 needs fewer steps for its first 10 "
+                "episodes than one with 0.5, above 0.5",
+                at_least=0.5,
+            ),
+            Criterion(
+                "slower: probability, among seeds that learned, that sigma 1 gets to 300 steps "
+                "in more episodes than 0.5, above 0.5",
+                at_least=0.5,
+            ),
+            Criterion(
+                "noisier: the same for a wider interquartile range of the last 500 episodes' "
+                "steps, above 0.5",
+                at_least=0.5,
+            ),
+        ),
+        "Figure S5.2",
+    ),
+    Claim(
+        "4d",
+        "4.1.3",
+        "Sigma 0.3: faster convergence and fewer steps, but early episodes can last extremely "
+        "long.",
+        (
+            Criterion(
+                "faster: probability, among seeds that learned, that sigma 0.3 gets to 300 steps "
+                "in fewer episodes than 0.5, above 0.5",
+                at_least=0.5,
+            ),
+            Criterion("fewer: the same for fewer steps at episode 5,000, above 0.5", at_least=0.5),
+            Criterion(
+                "long: share of seeds with more than 100,000 steps in one of the first 10 "
+                "episodes, at least a tenth",
+                at_least=0.1,
+            ),
+        ),
+        "Figure S5.2",
+    ),
+    Claim(
+        "4e",
+        "4.1.3",
+        "Sigma 0.5 is a good compromise.",
+        (
+            Criterion(
+                "against 0.3: share of seeds that learn, paired difference, at least 0.05",
+                at_least=0.05,
+            ),
+            Criterion(
+                "against 1: probability, among seeds that learned, of getting to 300 steps in "
+                "fewer episodes, above 0.5",
+                at_least=0.5,
+            ),
+            Criterion(
+                "against 1: the same for fewer steps at episode 5,000, above 0.5", at_least=0.5
+            ),
+        ),
+        "Figure S5.2",
+    ),
+    Claim(
+        "4f",
+        "4.1.3",
+        "Learning sigma too may do better but is more finicky.",
+        (
+            Criterion(
+                "better: probability, among seeds that learned, that learning sigma (from 0.5 on) "
+                "needs fewer steps at episode 5,000 than sigma 0.5, above 0.5",
+                at_least=0.5,
+            ),
+            Criterion(
+                "finicky: share of seeds that learn, sigma 0.5 minus learned sigma, paired, at "
+                "least 0.05",
+                at_least=0.05,
+            ),
+        ),
+        "Figure S5.2",
+    ),
+)
+
+
+class Curves:
+    """Steps and returns per episode of each arm, one row a seed; NaN after a seed's end."""
+
+    def __init__(self, table: pd.DataFrame) -> None:
+        self.rows = {str(arm): rows for arm, rows in table.groupby("arm", sort=False)}
+        shape = {"seeds": SEEDS, "episodes": EPISODES}
+        self.raw = {arm: learning_curves(rows, **shape) for arm, rows in self.rows.items()}
+        self.smooth = {
+            arm: learning_curves(rows, **shape, window=WINDOW) for arm, rows in self.rows.items()
+        }
+        self.returns = {
+            arm: learning_curves(rows, "return", **shape, window=WINDOW)
+            for arm, rows in self.rows.items()
+        }
+
+    def at(self, arm: str, episode: int | None = None) -> np.ndarray:
+        """Steps of each seed at an episode or the last; infinite where it had stopped before."""
+        steps = self.smooth[arm][:, (episode or EPISODES) - 1]
+        return np.where(np.isnan(steps), np.inf, steps)
+
+    def final_return(self, arm: str) -> np.ndarray:
+        """Return of each seed at the last episode; minus infinity where it had stopped before."""
+        returns = self.returns[arm][:, -1]
+        return np.where(np.isnan(returns), -np.inf, returns)
+
+    def learned(self, arm: str, episode: int | None = None) -> np.ndarray:
+        """Which seeds had learned by an episode, or by the last."""
+        return learned(self.raw[arm][:, :episode], LEARNED, window=WINDOW)
+
+    def episodes_to(self, arm: str, steps: float = CONVERGED) -> np.ndarray:
+        """Episodes until each seed first needs no more than `steps`; infinite if it never does."""
+        curves = np.where(np.isnan(self.smooth[arm]), np.inf, self.smooth[arm])
+        return episodes_to_threshold(curves, steps)
+
+    def early(self, arm: str) -> np.ndarray:
+        """Steps of each seed's first 10 episodes; infinite if one of them was stopped."""
+        first = self.rows[arm][self.rows[arm]["episode"] <= EARLY].groupby("seed")
+        steps = first["steps"].sum().where(first["terminated"].all(), np.inf)
+        return steps.reindex(SEEDS).to_numpy(float)
+
+    def longest_early(self, arm: str) -> np.ndarray:
+        """Steps of the longest of each seed's first 10 episodes, stopped ones included."""
+        first = self.rows[arm][self.rows[arm]["episode"] <= EARLY]
+        return first.groupby("seed")["steps"].max().reindex(SEEDS).to_numpy(float)
+
+    def spread(self, arm: str) -> np.ndarray:
+        """Interquartile range of each seed's steps in the last 500 episodes."""
+        low, high = np.quantile(self.raw[arm][:, -500:], [0.25, 0.75], axis=1)
+        return np.where(np.isnan(high - low), np.inf, high - low)
+
+
+def _middle(values: np.ndarray, rng: np.random.Generator) -> Interval:
+    """Median with its interval; for no seeds at all, everything is possible."""
+    if len(values) == 0:
+        return Interval(np.inf, -np.inf, np.inf)
+    return bootstrap_interval(values, rng=rng)
+
+
+def tradeoff(curves: Curves) -> pd.DataFrame:
+    """One row an arm of the sweeps and a measure: estimate and interval.
+
+    Lengths of early episodes and the share that learns are over all seeds, the rest over those
+    that learned.
+    """
+    rng = np.random.default_rng(np.random.SeedSequence(2021))
+    rows = []
+    for arm in [*(a for sweep in SWEEPS.values() for a in sweep), "sigma learned"]:
+        good = curves.learned(arm)
+        measures = {
+            "early": _middle(curves.early(arm) / EARLY, rng),
+            "learned": proportion_interval(int(good.sum()), len(SEEDS)),
+            "episodes": _middle(curves.episodes_to(arm)[good], rng),
+            "steps": _middle(curves.at(arm)[good], rng),
+            "spread": _middle(curves.spread(arm)[good], rng),
+            "return": _middle(curves.final_return(arm)[good], rng),
+        }
+        for measure, (estimate, low, high) in measures.items():
+            values = {"estimate": estimate, "low": low, "high": high}
+            rows.append({"arm": arm, "measure": measure, **values})
+    return pd.DataFrame(rows)
+
+
+def milestones(curves: Curves) -> pd.DataFrame:
+    """One row an arm: steps at the milestones with intervals, who learned, what was stopped."""
+    rng = np.random.default_rng(np.random.SeedSequence(2018))
+    rows = []
+    for arm, episodes in curves.rows.items():
+        good = curves.learned(arm)
+        row = {"arm": arm}
+        for episode in MILESTONES:
+            row[f"steps at {episode:,}"] = _text(_middle(curves.at(arm, episode), rng))
+        row["those that learned, at 3,000"] = _text(_middle(curves.at(arm, 3_000)[good], rng))
+        row["learned"] = f"{good.sum()} of {len(SEEDS)}"
+        low, high = proportion_interval(int(good.sum()), len(SEEDS))[1:]
+        row["share, 95%"] = f"{low:.0%} to {high:.0%}"
+        row["stopped episodes"] = int((~episodes["terminated"]).sum())
+        row["seeds out of budget"] = int((episodes.groupby("seed").size() < EPISODES).sum())
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _text(interval: Interval) -> str:
+    if np.isneginf(interval.low):
+        return "none"
+    estimate, low, high = ("∞" if np.isinf(x) else f"{x:,.0f}" for x in interval)
+    return f"{estimate} [{low}, {high}]"
+
+
+def wall_clock(results: Results) -> pd.DataFrame:
+    """Seconds one seed took, here and in the report."""
+    made = results.provenance[results.provenance["arm"] == "as reported"]
+    return pd.DataFrame(
+        {
+            "experiment": [f"{ENV}, as reported, one seed"],
+            "2018 (s)": [60 * REPORTED_MINUTES],
+            "now (s, mean)": [made["seconds"].mean()],
+            "now, all seeds (s)": [made["seconds"].sum()],
+            "processor": [made["processor"].iloc[0]],
+        }
+    )
+
+
+def median_seed(curves: Curves, arm: str) -> int:
+    """Position of the seed in the middle of those that learned, by their steps at the end.
+
+    If none learned, of all seeds: a rule, not a pick.
+    """
+    good = curves.learned(arm)
+    steps = np.where(good, curves.at(arm), np.inf)
+    order = np.argsort(steps, kind="stable")
+    return int(order[(max(int(good.sum()), 1) - 1) // 2])
+
+
+def findings(curves: Curves) -> list[Finding]:
+    """Hold the seeds against the criteria."""
+    rng = np.random.default_rng(np.random.SeedSequence(2019))
+    good = {arm: curves.learned(arm) for arm in curves.raw}
+
+    def about(arm: str, episode: int) -> tuple[Evidence, Evidence]:
+        steps, by_then = curves.at(arm, episode), curves.learned(arm, episode)
+        return _steps(steps, rng), _steps(steps[by_then], rng)
+
+    def lower(one: str, other: str, measure: Callable[[str], np.ndarray]) -> Evidence:
+        return _probability(measure(one), measure(other), rng)
+
+    def lower_if_learned(one: str, other: str, measure: Callable[[str], np.ndarray]) -> Evidence:
+        return _probability(measure(one)[good[one]], measure(other)[good[other]], rng)
+
+    def more_learn(one: str, other: str) -> Evidence:
+        difference = good[one].astype(float) - good[other]
+        return Evidence(*bootstrap_interval(difference, np.mean, rng=rng), seeds=len(SEEDS))
+
+    narrow, middle, wide, own = "as reported", "sigma 0.5", "sigma 1", "sigma learned"
+    long = int((curves.longest_early(narrow) > EXTREME).sum())
+    speed, end = curves.episodes_to, curves.at
+    discounts = (("as reported", "gamma 0.9"), ("sigma 0.5", "gamma 0.9, sigma 0.5"))
+    four_a, four_b, four_c, four_d, four_e, four_f = CLAIMS
+    return [
+        four_a.judge(*about(narrow, 3_000)),
+        four_b.judge(*(lower(*pair, measure) for pair in discounts for measure in (end, speed))),
+        four_c.judge(
+            lower(wide, middle, curves.early),
+            lower_if_learned(middle, wide, speed),
+            lower_if_learned(middle, wide, curves.spread),
+        ),
+        four_d.judge(
+            lower_if_learned(narrow, middle, speed),
+            lower_if_learned(narrow, middle, end),
+            Evidence(*proportion_interval(long, len(SEEDS)), seeds=len(SEEDS)),
+        ),
+        four_e.judge(
+            more_learn(middle, narrow),
+            lower_if_learned(middle, wide, speed),
+            lower_if_learned(middle, wide, end),
+        ),
+        four_f.judge(lower_if_learned(own, middle, end), more_learn(middle, own)),
+    ]
+
+
+def _steps(values: np.ndarray, rng: np.random.Generator) -> Evidence:
+    return Evidence(*_middle(values, rng), seeds=len(values))
+
+
+def _probability(one: np.ndarray, other: np.ndarray, rng: np.random.Generator) -> Evidence:
+    """Probability that a seed of `one` has the lower value; without seeds, anything."""
+    seeds = min(len(one), len(other))
+    if seeds == 0:
+        return Evidence(0.5, 0.0, 1.0, seeds=0)
+    return Evidence(*probability_of_improvement(one, other, rng=rng), seeds=seeds)

@@ -1,0 +1,190 @@
+"""Chapter 4: learning curves over those of 2018, causes side by side, and a value function."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+from dqn_study import BUDGET, ENV, EPISODES, LEARNED, Curves
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from rl_core.figures import BLACK, BLUE, COLOURS, GREY, LINES, ORANGE, VERMILLION, label
+from rl_core.q_networks import action_values
+from rl_core.rollouts import Rollout, Weights
+from rl_core.statistics import bootstrap_interval
+
+PARTS = 10  # of the budget, in the curves of steps a goal
+
+
+def learning_curve(curves: Curves, name: str, original: pd.DataFrame) -> Figure:
+    """Steps an episode of every seed, their median with its interval, and the curve of 2018."""
+    arm = f"{name}, as reported"
+    figure, axes = plt.subplots(figsize=(6.4, 4.6))
+    axes.fill_between(
+        *(original["episode"], original["low"], original["high"]),
+        color="#c9b458",
+        alpha=0.75,
+        lw=1.0,
+        label="2018 original, one run",
+    )
+    x = np.arange(1, EPISODES + 1)
+    seeds = curves.raw[arm]
+    for steps in seeds:
+        axes.plot(x, steps, color=GREY, ls="-", lw=0.4, alpha=0.6)
+    axes.plot([], [], color=GREY, ls="-", lw=0.8, label=f"each of {len(seeds)} seeds")
+    rows = curves.table[arm]
+    stopped = rows[~rows["terminated"]]
+    if len(stopped):
+        text = f"stopped before the goal ({len(stopped)} episodes)"
+        axes.plot(stopped["episode"], stopped["steps"], "x", color=BLACK, ms=5, label=text)
+    _median(axes, x, seeds, BLUE, "-", f"median of all {len(seeds)} seeds, 95% interval")
+    axes.set_yscale("log")
+    label(axes, x="episode", y="steps to the goal (log scale)")
+    figure.legend(loc="outside lower center", ncols=2, fontsize=9)
+    plt.close(figure)
+    return figure
+
+
+def discounts(curves: Curves) -> Figure:
+    """Median and interval for both discounts on both environments."""
+    figure, both = plt.subplots(2, 1, figsize=(6.4, 6.0), sharex=True)
+    x = np.arange(1, EPISODES + 1)
+    for axes, name in zip(both, ENV, strict=True):
+        variants = (("as reported", "γ = 0.99, as reported"), ("gamma 0.9", "γ = 0.9"))
+        for i, (variant, text) in enumerate(variants):
+            smooth = curves.smooth[f"{name}, {variant}"]
+            _median(axes, x, smooth, COLOURS[i], LINES[i], text if name == "Acrobot" else None)
+        axes.set_yscale("log")
+        label(axes, x="episode" if name != "Acrobot" else "", y="steps (log scale)", title=name)
+    figure.legend(loc="outside lower center", ncols=2, fontsize=9)
+    plt.close(figure)
+    return figure
+
+
+def shares(curves: Curves, variants: Sequence[str]) -> Figure:
+    """Share of seeds that learned after each change, with its interval, on both environments."""
+    figure, axes = plt.subplots(figsize=(6.4, 5.6))
+    y = np.arange(len(variants))[::-1]
+    marks = zip(ENV, ("o", "s"), (BLUE, VERMILLION), (0.14, -0.14), strict=True)
+    for name, marker, colour, offset in marks:
+        found = np.array([curves.share(f"{name}, {variant}") for variant in variants])
+        errors = np.abs(found[:, 1:].T - found[:, 0])
+        axes.errorbar(
+            *(found[:, 0], y + offset),
+            xerr=errors,
+            fmt=marker,
+            color=colour,
+            ls="",
+            ms=6,
+            elinewidth=1.2,
+            label=name,
+        )
+    axes.set_yticks(y, [variant.replace("original, ", "+ ") for variant in variants])
+    axes.set_xlim(-0.02, 1.02)
+    label(axes, x=f"share of seeds that learn (at most {LEARNED} steps a goal)", y="")
+    figure.legend(loc="outside lower center", ncols=2)
+    plt.close(figure)
+    return figure
+
+
+def over_the_budget(curves: Curves, names: dict[str, str]) -> Figure:
+    """Steps a goal in each tenth of the budget: median over seeds and its interval."""
+    figure, both = plt.subplots(2, 1, figsize=(6.4, 7.0))
+    edges = np.linspace(0, 1, PARTS + 1)
+    for axes, name in zip(both, ENV, strict=True):
+        middles = (edges[1:] + edges[:-1]) / 2 * BUDGET[name] / 1000
+        for i, (variant, text) in enumerate(names.items()):
+            arm = f"{name}, {variant}"
+            steps = np.array(
+                [curves.steps_a_goal(arm, low, high) for low, high in pairwise(edges)]
+            ).T
+            _median(
+                *(axes, middles, steps, COLOURS[i], LINES[i]),
+                text if name == "Acrobot" else None,
+                top=BUDGET[name] / PARTS,
+            )
+        axes.set_yscale("log")
+        label(axes, x="environment steps (thousands)", y="steps a goal (log scale)", title=name)
+    figure.legend(loc="outside lower center", ncols=2, fontsize=9)
+    plt.close(figure)
+    return figure
+
+
+def _median(
+    axes: Axes,
+    x: np.ndarray,
+    seeds: np.ndarray,
+    colour: str,
+    line: object,
+    text: str | None,
+    top: float | None = None,
+) -> None:
+    """Median over seeds; a seed that stopped, or reached no goal, counts as needing for ever."""
+    values = np.where(np.isnan(seeds), np.inf, seeds)
+    rng = np.random.default_rng(np.random.SeedSequence(2020))
+    middle, low, high = bootstrap_interval(values, rng=rng, resamples=2_000)
+    top = top or np.nanmax(seeds)
+    axes.fill_between(
+        x,
+        low,
+        np.where(np.isinf(high), top, high),
+        where=np.isfinite(low),
+        color=colour,
+        alpha=0.22,
+        lw=0,
+    )
+    drawn = np.where(np.isinf(middle), np.nan, middle)
+    axes.plot(x, drawn, color=colour, ls=line, marker="." if top and len(x) == PARTS else "")
+    axes.plot([], [], color=colour, ls=line, label=text)
+
+
+PUSHES = ("left", "none", "right")
+_PUSH_COLOURS = ListedColormap(["#56B4E9", "#eeeeee", ORANGE])
+
+
+def state_plane(policies: dict[str, tuple[Weights, Rollout]]) -> Figure:
+    """MountainCar's values and greedy pushes over position and velocity, with one trajectory.
+
+    Parameters
+    ----------
+    policies : dict of str to (weights, episode)
+        One row of panels each, by its title.
+    """
+    figure, panels = plt.subplots(len(policies), 2, figsize=(7.2, 3.3 * len(policies)))
+    position, velocity = np.linspace(-1.2, 0.6, 181), np.linspace(-0.07, 0.07, 141)
+    grid = np.stack(np.meshgrid(position, velocity), axis=-1).reshape(-1, 2)
+    shape = (len(velocity), len(position))
+    for row, (title, (weights, episode)) in zip(
+        np.atleast_2d(panels), policies.items(), strict=True
+    ):
+        q = action_values(weights, grid)
+        values = row[0].pcolormesh(
+            *(position, velocity, q.max(axis=1).reshape(shape)), cmap="cividis", rasterized=True
+        )
+        figure.colorbar(values, ax=row[0], label="max Q(s, a)")
+        row[1].pcolormesh(
+            *(position, velocity, q.argmax(axis=1).reshape(shape)),
+            cmap=_PUSH_COLOURS,
+            vmin=-0.5,
+            vmax=2.5,
+            rasterized=True,
+        )
+        for axes, ink in zip(row, ("white", BLACK), strict=True):
+            axes.plot(*episode.observations.T, color=ink, ls="-", lw=1.2)
+            axes.plot(*episode.observations[0], "o", color=ink, ms=5)
+            axes.axvline(0.5, color=ink, ls=":", lw=1)
+            axes.grid(visible=False)
+            label(axes, x="position", y="velocity (a step)")
+        row[0].set_title(f"{title}: value", fontsize=10)
+        row[1].set_title("greedy push", fontsize=10)
+    handles = [
+        Line2D([], [], marker="s", ls="", ms=9, mec=GREY, color=_PUSH_COLOURS(i), label=push)
+        for i, push in enumerate(PUSHES)
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, title="push")
+    plt.close(figure)
+    return figure

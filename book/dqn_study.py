@@ -1,0 +1,414 @@
+"""Chapter 4: the arms of DQN, what the report claims about them, and how it is measured.
+
+The report's figures are reproduced with its settings, batches of 512 and 100 episodes. The search
+for the causes uses batches of 32, which is what the program of 2018 really used, and gives every
+arm of an environment the same budget of environment steps. Budgets, and the settings of the
+changes, were chosen on seeds from 1000 on.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from seeds import SEEDS
+
+from rl_core.arm import Arm
+from rl_core.claims import Claim, Criterion, Evidence, Finding
+from rl_core.dqn import DQNConfig, dqn
+from rl_core.epsilon import Decay
+from rl_core.experiments import Results, run
+from rl_core.shaping import Shaping
+from rl_core.statistics import (
+    bootstrap_interval,
+    episodes_to_threshold,
+    learned,
+    learning_curves,
+    probability_of_improvement,
+    proportion_interval,
+)
+
+EPISODES = 100  # of figures 12 and 13
+BUDGET = {"Acrobot": 25_000, "MountainCar": 45_000}  # environment steps a seed, for the causes
+FIGURE_BUDGET = 60_000  # environment steps a seed, for the figures; 100 episodes need about half
+ENV = {"Acrobot": "Acrobot-v1", "MountainCar": "MountainCar-v0"}
+CAP = {"Acrobot": 5_000, "MountainCar": 10_000}  # steps an episode, as in 2018
+MEMORY = {"Acrobot": 3_000, "MountainCar": 4_000}
+SHAPING = {
+    "Acrobot": Shaping("rl_core.shaping:tip_height"),
+    "MountainCar": Shaping("rl_core.shaping:distance_from_start"),
+}
+PARTS = 10  # of a budget, in the curves of steps a goal
+WINDOW = 10  # episodes; "steps at episode k" is a seed's median over the last 10 up to k
+LEARNED = 500  # steps; as in chapter 3
+MILESTONES = (20, 50, 100)
+REPORTED = {"Acrobot": 80, "MountainCar": 140}  # steps after 20 episodes
+SECONDS = {"Acrobot": 3, "MountainCar": 5}
+RIVALS = ("terminal flag", "exploration", "long memory", "biases")
+
+
+def reported(name: str) -> DQNConfig:
+    """What figures 12 and 13 were made with."""
+    return DQNConfig(
+        memory_size=MEMORY[name],
+        learning_starts=MEMORY[name],
+        shaping=SHAPING[name],
+        bootstrap_through_end=True,
+        max_episode_steps=CAP[name],
+        max_env_steps=FIGURE_BUDGET,
+    )
+
+
+def _small(name: str) -> DQNConfig:
+    """The reported settings with the program's batch, run to the budget."""
+    return replace(reported(name), batch_size=32, max_env_steps=BUDGET[name])
+
+
+def mended(name: str, rivals: Sequence[str]) -> DQNConfig:
+    """The original reward with some of the rival causes of failure mended."""
+    changes: dict[str, dict] = {
+        "terminal flag": {"bootstrap_through_end": False},
+        "exploration": {"epsilon": Decay(1.0, 0.1, BUDGET[name] // 2), "persistence": 10},
+        "long memory": {"memory_size": BUDGET[name]},
+        "biases": {"biases": True},
+    }
+    chosen = {key: value for rival in rivals for key, value in changes[rival].items()}
+    return replace(_small(name), shaping=None, **chosen)
+
+
+def causes() -> dict[str, tuple[str, ...]]:
+    """What each arm on the original reward mends: none, one, two, all but one, or all causes."""
+    alone = {f"original, {rival}": (rival,) for rival in RIVALS}
+    but_one = {
+        f"original, all but {rival}": tuple(other for other in RIVALS if other != rival)
+        for rival in RIVALS
+    }
+    two = {"original, terminal flag and biases": ("terminal flag", "biases")}
+    return {"original": (), **alone, **two, **but_one, "original, all four": RIVALS}
+
+
+def arms() -> list[Arm]:
+    """Every variant on both environments."""
+    made = []
+    for name, env in ENV.items():
+        as_reported = reported(name)
+        shaped = _small(name)
+        no_replay = {"memory_size": 32}
+        to_budget = {
+            "shaped": shaped,
+            "shaped, gamma 0.9": replace(shaped, gamma=0.9),
+            "shaped, no replay": replace(shaped, **no_replay),
+            "shaped, no fixed target": replace(shaped, copy_every=1),
+            "original, no replay": replace(mended(name, ()), **no_replay),
+            **{variant: mended(name, rivals) for variant, rivals in causes().items()},
+        }
+        at = (20, EPISODES)
+        made.append(Arm(f"{name}, as reported", dqn, env, as_reported, EPISODES, snapshots=at))
+        for variant, config in to_budget.items():
+            # More episodes than the budget allows, so that it is the budget that ends a seed.
+            made.append(Arm(f"{name}, {variant}", dqn, env, config, BUDGET[name] // 20))
+    return made
+
+
+def learn(store: Path) -> Results:
+    """Run what the store does not have; the rest is read."""
+    return run(arms(), seeds=SEEDS, store=store)
+
+
+def steps_a_goal(episodes: pd.DataFrame, name: str, start: float = 0.75, end: float = 1.0) -> float:
+    """Environment steps of a part of the budget, divided by the goals reached in it.
+
+    Parameters
+    ----------
+    episodes : pandas.DataFrame
+        The rows of one seed.
+    name : str
+        The environment.
+    start, end : float
+        The part, as shares of the budget; the last quarter unless told.
+
+    Returns
+    -------
+    float
+        Infinity if no goal was reached. Episodes that were stopped count with their steps.
+    """
+    low, high = start * BUDGET[name], end * BUDGET[name]
+    at = episodes["env_steps"][episodes["terminated"]]
+    goals = int(((at > low) & (at <= high)).sum())
+    return (high - low) / goals if goals else np.inf
+
+
+# The criteria of 3l follow from the claim: if the reward and its replay were the cause, nothing
+# else would help while both are kept, and doing without replay would. What each rival does alone
+# and together with others is not for the verdict to say, but for the figure.
+CLAIMS = (
+    Claim(
+        "3f",
+        "3.2.2",
+        "Acrobot, DQN, shaped reward: about 80 steps after 20 episodes.",
+        (
+            Criterion("steps at episode 20, median over all seeds, 60 to 100", 60, 100),
+            Criterion("the same over the seeds that learned by then", 60, 100),
+        ),
+        "Figure 12",
+    ),
+    Claim(
+        "3g",
+        "3.2.3",
+        "MountainCar, DQN, shaped reward: about 140 steps after 20 episodes.",
+        (
+            Criterion("steps at episode 20, median over all seeds, 105 to 175", 105, 175),
+            Criterion("the same over the seeds that learned by then", 105, 175),
+        ),
+        "Figure 13",
+    ),
+    Claim(
+        "3h",
+        "3.2.2-3",
+        "DQN hardly converges on the original rewards, in either environment.",
+        tuple(
+            criterion
+            for name in ENV
+            for criterion in (
+                Criterion(
+                    f"{name}: share of seeds that learn with the original reward (at most 500 "
+                    "steps a goal in the last quarter of the budget), at most a quarter",
+                    at_most=0.25,
+                ),
+                Criterion(
+                    f"{name}: probability that a seed with the shaped reward needs fewer steps a "
+                    "goal there than one with the original reward, above 0.5",
+                    at_least=0.5,
+                ),
+            )
+        ),
+        "Figure S4.2",
+    ),
+    Claim(
+        "3i",
+        "3.2",
+        "DQN: gamma 0.99 converges faster and better than 0.9.",
+        tuple(
+            criterion
+            for name in ENV
+            for criterion in (
+                Criterion(
+                    f"{name}, better: probability that a seed with 0.99 needs fewer steps a goal "
+                    "in the last quarter of the budget than one with 0.9, shaped reward, above 0.5",
+                    at_least=0.5,
+                ),
+                Criterion(
+                    f"{name}, faster: probability that it gets to 200 steps a goal in fewer tenths "
+                    "of the budget, above 0.5",
+                    at_least=0.5,
+                ),
+            )
+        ),
+        "Figure S4.1",
+    ),
+    Claim(
+        "3j",
+        "3.2.1",
+        "Experience replay improves DQN's convergence.",
+        tuple(
+            Criterion(
+                f"{name}, shaped reward: probability that a seed with replay needs fewer steps a "
+                "goal in the last quarter of the budget than one that learns from its latest 32 "
+                "steps, above 0.5",
+                at_least=0.5,
+            )
+            for name in ENV
+        ),
+        "Table 4.2",
+    ),
+    Claim(
+        "3k",
+        "3.2.1",
+        "A fixed target network improves DQN's convergence.",
+        tuple(
+            Criterion(
+                f"{name}, shaped reward: probability that a seed with fixed targets needs fewer "
+                "steps a goal in the last quarter of the budget than one without, above 0.5",
+                at_least=0.5,
+            )
+            for name in ENV
+        ),
+        "Table 4.2",
+    ),
+    Claim(
+        "3l",
+        "3.2.4",
+        "DQN fails on the original rewards because replay sees uniform rewards step by step.",
+        tuple(
+            criterion
+            for name in ENV
+            for criterion in (
+                Criterion(
+                    f"{name}: reward and replay kept, all four rival causes mended: share of seeds "
+                    "that learn, at most a quarter",
+                    at_most=0.25,
+                ),
+                Criterion(
+                    f"{name}: probability that a seed without replay needs fewer steps a goal "
+                    "than one with it, on the original reward, above 0.5",
+                    at_least=0.5,
+                ),
+            )
+        ),
+        "Figure S4.2",
+    ),
+)
+
+
+class Curves:
+    """Steps per episode of the reported arms, and steps a goal at the end of every arm."""
+
+    def __init__(self, table: pd.DataFrame) -> None:
+        by_arm = {str(arm): rows for arm, rows in table.groupby("arm", sort=False)}
+        self.table = by_arm
+        self.raw, self.smooth = {}, {}
+        for name in ENV:
+            arm = f"{name}, as reported"
+            shape = {"seeds": SEEDS, "episodes": EPISODES}
+            self.raw[arm] = learning_curves(by_arm[arm], **shape)
+            self.smooth[arm] = learning_curves(by_arm[arm], window=WINDOW, **shape)
+
+    def at(self, arm: str, episode: int) -> np.ndarray:
+        """Steps of each seed at an episode; infinite where the seed had stopped before."""
+        steps = self.smooth[arm][:, episode - 1]
+        return np.where(np.isnan(steps), np.inf, steps)
+
+    def learned(self, arm: str, episode: int = EPISODES) -> np.ndarray:
+        """Which seeds of a reported arm had learned by an episode."""
+        return learned(self.raw[arm][:, :episode], LEARNED, window=WINDOW)
+
+    def steps_a_goal(self, arm: str, start: float = 0.75, end: float = 1.0) -> np.ndarray:
+        """Steps a goal of each seed in a part of the budget."""
+        name, rows = arm.partition(",")[0], self.table[arm]
+        of_seed = dict(list(rows.groupby("seed")))
+        return np.array([steps_a_goal(of_seed[seed], name, start, end) for seed in SEEDS])
+
+    def parts(self, arm: str) -> np.ndarray:
+        """Steps a goal of each seed in each tenth of the budget, of shape (seeds, tenths)."""
+        edges = np.linspace(0.0, 1.0, PARTS + 1)
+        return np.array([self.steps_a_goal(arm, *ends) for ends in pairwise(edges)]).T
+
+    def share(self, arm: str) -> tuple[float, float, float]:
+        """Share of seeds that learned, by their steps a goal at the end, with its interval."""
+        count = int((self.steps_a_goal(arm) <= LEARNED).sum())
+        return tuple(proportion_interval(count, len(SEEDS)))
+
+
+def _interval(interval: tuple[float, float, float]) -> str:
+    estimate, low, high = ("∞" if np.isinf(x) else f"{x:,.0f}" for x in interval)
+    return f"{estimate} [{low}, {high}]"
+
+
+def milestones(curves: Curves) -> pd.DataFrame:
+    """One row a reported arm: steps at the milestones with intervals, who learned, the capped."""
+    rng = np.random.default_rng(np.random.SeedSequence(2018))
+    rows = []
+    for arm in curves.smooth:
+        row = {"arm": arm}
+        for episode in MILESTONES:
+            interval = bootstrap_interval(curves.at(arm, episode), rng=rng)
+            row[f"steps at {episode}"] = _interval(interval)
+        for episode in (20, EPISODES):
+            row[f"learned by {episode}"] = (
+                f"{int(curves.learned(arm, episode).sum())} of {len(SEEDS)}"
+            )
+        row["capped episodes"] = int((~curves.table[arm]["terminated"]).sum())
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def to_the_budget(curves: Curves, variants: Sequence[str]) -> pd.DataFrame:
+    """One row a variant: steps a goal in the last quarter of the budget, and who learned."""
+    rng = np.random.default_rng(np.random.SeedSequence(2021))
+    rows = []
+    for variant in variants:
+        row = {"variant": variant}
+        for name in ENV:
+            arm = f"{name}, {variant}"
+            row[f"{name}: steps a goal"] = _interval(
+                bootstrap_interval(curves.steps_a_goal(arm), rng=rng)
+            )
+            share = curves.share(arm)
+            count = round(share[0] * len(SEEDS))
+            row[f"{name}: learned"] = f"{count} of {len(SEEDS)} ({share[1]:.0%} to {share[2]:.0%})"
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def wall_clock(results: Results) -> pd.DataFrame:
+    """Seconds one seed took, here and in the report."""
+    made = results.provenance
+    rows = []
+    for name, seconds in SECONDS.items():
+        of_arm = made[made["arm"] == f"{name}, as reported"]
+        rows.append(
+            {
+                "experiment": f"{name}, DQN, {EPISODES} episodes of one seed",
+                "2018 (s)": seconds,
+                "now (s, mean)": of_arm["seconds"].mean(),
+                "now, all (s)": of_arm["seconds"].sum(),
+                "processor": of_arm["processor"].iloc[0],
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def median_seed(curves: Curves, name: str) -> int:
+    """Position of the seed in the middle, all ordered by their steps at the end: a rule."""
+    order = np.argsort(curves.at(f"{name}, as reported", EPISODES), kind="stable")
+    return int(order[(len(order) - 1) // 2])
+
+
+def findings(curves: Curves) -> list[Finding]:
+    """Hold the seeds against the criteria."""
+    rng = np.random.default_rng(np.random.SeedSequence(2019))
+
+    def about(arm: str, episode: int) -> tuple[Evidence, Evidence]:
+        steps, good = curves.at(arm, episode), curves.learned(arm, episode)
+        some = steps[good] if good.any() else np.array([np.inf])
+        return _evidence(steps, rng), _evidence(some, rng)
+
+    def better(one: str, other: str, measure: Callable[[str], np.ndarray]) -> Evidence:
+        interval = probability_of_improvement(measure(one), measure(other), rng=rng)
+        return Evidence(*interval, seeds=len(SEEDS))
+
+    def share(arm: str) -> Evidence:
+        return Evidence(*curves.share(arm), seeds=len(SEEDS))
+
+    def to_200(arm: str) -> np.ndarray:
+        return episodes_to_threshold(curves.parts(arm), 200)
+
+    three_f, three_g, three_h, three_i, three_j, three_k, three_l = CLAIMS
+    goal = curves.steps_a_goal
+    h, i, j, k, cause = [], [], [], [], []
+    for name in ENV:
+        shaped, original = f"{name}, shaped", f"{name}, original"
+        pair = shaped, f"{shaped}, gamma 0.9"
+        h += [share(original), better(shaped, original, goal)]
+        i += [better(*pair, goal), better(*pair, to_200)]
+        j.append(better(shaped, f"{shaped}, no replay", goal))
+        k.append(better(shaped, f"{shaped}, no fixed target", goal))
+        cause += [
+            share(f"{original}, all four"),
+            better(f"{original}, no replay", original, goal),
+        ]
+    return [
+        three_f.judge(*about("Acrobot, as reported", 20)),
+        three_g.judge(*about("MountainCar, as reported", 20)),
+        three_h.judge(*h),
+        three_i.judge(*i),
+        three_j.judge(*j),
+        three_k.judge(*k),
+        three_l.judge(*cause),
+    ]
+
+
+def _evidence(values: np.ndarray, rng: np.random.Generator) -> Evidence:
+    return Evidence(*bootstrap_interval(values, rng=rng), seeds=len(values))

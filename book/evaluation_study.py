@@ -1,0 +1,536 @@
+"""Chapter 6: the tables and the arms under time limits, and what the report claims of all agents.
+
+Settings of the tables were chosen on seeds 1000 to 1003: of step sizes 0.1 and 0.3 and several ways
+to explore, the one that learned on both cars; of the numbers of bins, 20, with which the steps at
+the end were fewest. An episode of training is stopped after 3,000 steps.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import continuous_study
+import dqn_study
+import numpy as np
+import pandas as pd
+import reinforce_study
+from joblib import Parallel, delayed
+from scipy.stats import kendalltau
+from seeds import SEEDS
+
+from rl_core.arm import Arm
+from rl_core.claims import Claim, Criterion, Evidence, Finding
+from rl_core.discretise import binned
+from rl_core.evaluation import Agent, as_learned, evaluate, evaluate_table, greedy, of_values
+from rl_core.experiments import Results, run
+from rl_core.exploration import EpsilonGreedy, Evaluation, Linear
+from rl_core.fastest import Fastest, fastest
+from rl_core.grid_learning import GridConfig, q_learning_on_grid
+from rl_core.q_learning import QLearningConfig
+from rl_core.rollouts import weights_of
+from rl_core.statistics import bootstrap_interval, proportion_interval
+
+ENV = {
+    "Acrobot": "Acrobot-v1",
+    "MountainCar": "MountainCar-v0",
+    "MountainCarContinuous": "MountainCarContinuous-v0",
+}
+LIMIT = {"Acrobot": 500, "MountainCar": 200, "MountainCarContinuous": 999}  # Gymnasium's own
+LEVELS = {"Acrobot": None, "MountainCar": None, "MountainCarContinuous": 3}  # forces -1, 0, 1
+
+BINS = (5, 10, 20, 40, 80)  # in each of the cars' two dimensions
+BEST_BINS = 20
+ACROBOT_BINS = 6  # in each of six dimensions: 46,656 cells
+TABLE_EPISODES = 2_000
+TABLE_CAP = 3_000  # steps an episode of training
+LIMITED_EPISODES = 2_000  # at most, under a time limit
+
+EPISODES = 100  # of evaluation, an agent and seed
+CAP = 5_000  # steps an episode of evaluation; a stopped one counts with these
+LEARNED = 500  # steps; an agent that learned needs at most so many on average
+POINTS = (50, 100, 200, 400, 800)  # grid points a dimension, for the fastest way
+STARTS = np.linspace(-0.6, -0.4, 401)
+
+
+def table_config(name: str, bins: int, limit: int = TABLE_CAP) -> GridConfig:
+    """Q-learning on a grid, exploring less and less over the first 500 episodes."""
+    learning = QLearningConfig(
+        gamma=0.99,
+        step_size=0.3,
+        exploration=EpsilonGreedy(Linear(1.0, 0.02, 500)),
+        max_steps=limit,
+        evaluation=Evaluation(every=TABLE_EPISODES, episodes=1, max_steps=1),  # done below
+    )
+    return GridConfig(bins, LEVELS[name], learning)
+
+
+def table_arm(name: str, bins: int, limit: int = TABLE_CAP) -> Arm:
+    """A table on an environment; under a time limit if one is given."""
+    under = "" if limit == TABLE_CAP else ", under the limit"
+    config = table_config(name, bins, limit)
+    return Arm(
+        f"{name}, table, {bins} bins{under}", q_learning_on_grid, ENV[name], config, TABLE_EPISODES
+    )
+
+
+def chosen_bins(name: str) -> int:
+    """The number of bins with which a table enters the comparison."""
+    return ACROBOT_BINS if name == "Acrobot" else BEST_BINS
+
+
+def reported_arms() -> list[Arm]:
+    """The networks as the chapters before trained them, named by environment and agent."""
+    studies = (
+        ("REINFORCE", reinforce_study.arms(), "{}, as reported"),
+        ("DQN", dqn_study.arms(), "{}, as reported"),
+        ("REINFORCE", continuous_study.arms(), "as reported"),
+    )
+    environments = {env: name for name, env in ENV.items()}
+    found = []
+    for agent, of_study, pattern in studies:
+        for arm in of_study:
+            environment = environments[arm.env]
+            if arm.name == pattern.format(environment):
+                found.append(replace(arm, name=f"{environment}, {agent}"))
+    return found
+
+
+def limited(name: str, arm: Arm) -> Arm:
+    """The same agent, trained under Gymnasium's time limit; it learns from stopped episodes too."""
+    changes = {"max_episode_steps": LIMIT[name]}
+    if hasattr(arm.config, "learn_from_capped"):
+        changes["learn_from_capped"] = True
+    return replace(
+        arm,
+        name=f"{arm.name}, under the limit",
+        config=replace(arm.config, **changes),
+        episodes=min(arm.episodes, LIMITED_EPISODES),
+        snapshots=(),
+    )
+
+
+def environment_of(arm: str) -> str:
+    """The environment that an arm's name begins with."""
+    return arm.partition(",")[0]
+
+
+def arms() -> list[Arm]:
+    """Networks as reported, all of them under time limits, and the tables."""
+    networks = reported_arms()
+    tables = [table_arm(name, bins) for name in list(ENV)[1:] for bins in BINS]
+    tables.append(table_arm("Acrobot", ACROBOT_BINS))
+    under = [limited(environment_of(arm.name), arm) for arm in networks]
+    under += [table_arm(name, chosen_bins(name), LIMIT[name]) for name in ENV]
+    return [*networks, *tables, *under]
+
+
+def learn(store: Path) -> Results:
+    """Run what the store does not have; the rest is read."""
+    return run(arms(), seeds=SEEDS, store=store)
+
+
+@dataclass(frozen=True)
+class Tried:
+    """How an agent is tried out.
+
+    Attributes
+    ----------
+    environment, agent : str
+        What the tables of the chapter call them.
+    arm : str or None
+        What it learned; None for one that acts at random.
+    acting : str
+        "as learned", with the policy's own randomness, or "greedy".
+    """
+
+    environment: str
+    agent: str
+    arm: str | None
+    acting: str
+
+    @property
+    def trained(self) -> str:
+        """Under which limit the agent was trained."""
+        if self.arm is None:
+            return "not at all"
+        return "time limit" if self.arm.endswith("under the limit") else "no limit"
+
+
+def tried() -> list[Tried]:
+    """All agents of the comparison, in the order of its tables."""
+    found = []
+    for name in ENV:
+        found.append(Tried(name, "random", None, "random"))
+        for arm in arms():
+            if environment_of(arm.name) != name:
+                continue
+            agent = arm.name.removeprefix(f"{name}, ").removesuffix(", under the limit")
+            stochastic = agent == "REINFORCE"
+            for acting in ("as learned", "greedy") if stochastic else ("greedy",):
+                found.append(Tried(name, agent, arm.name, acting))
+    return found
+
+
+def shaped_return(name: str) -> Callable[..., float]:
+    """Undiscounted return under the rewards that chapter 4's DQN learns from."""
+    if name == "Acrobot":
+
+        def tip_height(observations, actions, rewards):
+            c1, s1, c2, s2 = observations[1:, :4].T.astype(float)
+            return float(-(c1 + (c1 * c2 - s1 * s2)).sum())
+
+        return tip_height
+
+    def distance_from_start(observations, actions, rewards):
+        return float(np.abs(observations[1:, 0].astype(float) + 0.5).sum())
+
+    return distance_from_start
+
+
+def try_out(one: Tried, results: Results) -> pd.DataFrame:
+    """Evaluate an agent with every seed: one row an episode."""
+    rules = {"episodes": EPISODES, "max_steps": CAP, "limit": LIMIT[one.environment]}
+    levels = LEVELS[one.environment]
+    env = ENV[one.environment]
+    tables = []
+    if one.arm is None or ", table, " in one.arm:
+        bins = 1 if one.arm is None else int(one.arm.split(", table, ")[1].split()[0])
+        world = binned(env, bins, levels=levels)
+        Q = None if one.arm is None else results.arrays(one.arm)["Q"]
+        for i, seed in enumerate(SEEDS):
+            values = np.zeros(world.shape) if Q is None else Q[i]
+            tables.append(evaluate_table(world, values, seed=seed, **rules))
+    else:
+        arrays = results.arrays(one.arm)
+        config = next(arm.config for arm in arms() if arm.name == one.arm)
+        measures = {"shaped_return": shaped_return(one.environment)}
+        for i, seed in enumerate(SEEDS):
+            agent = make_agent(one, config, weights_of(arrays, i))
+            tables.append(evaluate(env, agent, seed=seed, measures=measures, **rules))
+    table = pd.concat(tables, keys=SEEDS, names=["seed"]).reset_index(level="seed")
+    for column in ("environment", "agent", "trained", "acting"):
+        table.insert(0, column, getattr(one, column))
+    return table.reset_index(drop=True)
+
+
+def make_agent(one: Tried, config: object, weights: dict[str, np.ndarray]) -> Agent:
+    """The agent of one seed."""
+    if not hasattr(config, "policy"):
+        return of_values(weights)
+    agent = as_learned(config, weights)
+    return greedy(agent) if one.acting == "greedy" else agent
+
+
+def evaluate_all(results: Results) -> pd.DataFrame:
+    """Evaluate every agent of `tried`; compiled episodes leave the interpreter free for others."""
+    agents = Parallel(n_jobs=2, backend="threading")(
+        delayed(try_out)(one, results) for one in tried()
+    )
+    return pd.concat(agents, ignore_index=True)
+
+
+KEY = ["environment", "agent", "trained", "acting"]
+
+
+def by_seed(episodes: pd.DataFrame) -> pd.DataFrame:
+    """Means over the episodes of each agent and seed: one row a policy."""
+    columns = {
+        "steps": "mean",
+        "return": "mean",
+        "terminated": "mean",
+        "shaped_return": "mean",
+        "limited_steps": "mean",
+        "limited_return": "mean",
+        "limited_terminated": "mean",
+    }
+    return episodes.groupby([*KEY, "seed"], sort=False).agg(columns).reset_index()
+
+
+def summary(policies: pd.DataFrame, name: str) -> pd.DataFrame:
+    """The table of an environment: medians over seeds with 95% intervals."""
+    rng = np.random.default_rng(np.random.SeedSequence(2021))
+
+    def interval(values: pd.Series, digits: int) -> str:
+        numbers = bootstrap_interval(values.to_numpy(), rng=rng)
+        estimate, low, high = (f"{x:,.{digits}f}" for x in numbers)
+        return f"{estimate} [{low}, {high}]".replace("-", "−")
+
+    digits = 1 if name == "MountainCarContinuous" else 0
+    rows = []
+    of_environment = policies[policies["environment"] == name]
+    for key, seeds in of_environment.groupby(KEY[1:], sort=False):
+        rows.append(
+            {
+                **dict(zip(("agent", "trained under", "acts"), key, strict=True)),
+                "steps, no limit": interval(seeds["steps"], 0),
+                "reached (%)": 100 * seeds["terminated"].mean(),
+                f"return within {LIMIT[name]} steps": interval(seeds["limited_return"], digits),
+                "reached in time (%)": 100 * seeds["limited_terminated"].mean(),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def steps_of(
+    policies: pd.DataFrame, name: str, agent: str, acting: str, trained: str = "no limit"
+) -> np.ndarray:
+    """Mean steps of every seed of an agent, without limit."""
+    chosen = (policies[KEY] == [name, agent, trained, acting]).all(axis=1)
+    return policies.loc[chosen, "steps"].to_numpy()
+
+
+def optima() -> dict[str, list[Fastest]]:
+    """The fastest ways up, on finer and finer grids."""
+    return {
+        name: [fastest(ENV[name], STARTS, points=points) for points in POINTS]
+        for name in ("MountainCar", "MountainCarContinuous")
+    }
+
+
+def training(results: Results, arm: str) -> tuple[np.ndarray, np.ndarray]:
+    """Environment steps and seconds that each seed of an arm took to train."""
+    rows = results.table[results.table["arm"] == arm]
+    made = results.provenance[results.provenance["arm"] == arm]
+    return rows.groupby("seed")["env_steps"].max().to_numpy(), made["seconds"].to_numpy()
+
+
+# The claims. Criteria are fixed before seeds 0 to 29 are run.
+
+TIMES = {  # seconds, in the report
+    "Acrobot, REINFORCE": 120,
+    "MountainCar, REINFORCE": 180,
+    "Acrobot, DQN": 3,
+    "MountainCar, DQN": 5,
+    "MountainCarContinuous, REINFORCE": 180,
+}
+CLAIMS = (
+    Claim(
+        "3m",
+        "3.3",
+        "Steps to completion and undiscounted return rank policies the same.",
+        tuple(
+            Criterion(
+                f"{name}: Kendall's tau between the rankings of all evaluated policies by fewest "
+                "steps and by highest undiscounted return (no time limit) at least 0.99",
+                at_least=0.99,
+            )
+            for name in ("Acrobot", "MountainCar")
+        ),
+        "Figure S6.2",
+    ),
+    Claim(
+        "3n",
+        "3.4",
+        "In a continuous world, discretising is a workable alternative to function approximation.",
+        (
+            *(
+                Criterion(
+                    f"{name}: steps of the greedy table with {bins} bins a dimension, median over "
+                    "all seeds, at most 1.25 times those of REINFORCE's network, median over the "
+                    "seeds that learned",
+                    at_most=1.25,
+                )
+                for name, bins in (
+                    ("MountainCar", BEST_BINS),
+                    ("MountainCarContinuous", BEST_BINS),
+                    ("Acrobot", ACROBOT_BINS),
+                )
+            ),
+            *(
+                Criterion(
+                    f"{name}: share of seeds whose greedy table needs at most {LEARNED} steps on "
+                    "average, at least 0.8",
+                    at_least=0.8,
+                )
+                for name in ("MountainCar", "MountainCarContinuous")
+            ),
+        ),
+        "Figure S6.3",
+    ),
+    Claim(
+        "t",
+        "3.1-4",
+        "Wall-clock time for one run: 2 and 3 minutes (REINFORCE), 3 and 5 seconds (DQN), "
+        "3 minutes (continuous).",
+        tuple(
+            Criterion(f"{name}: the report's {seconds} s at least 1 times ours", at_least=1)
+            for name, seconds in TIMES.items()
+        ),
+        "Table 6.8",
+    ),
+)
+
+
+def agreement(policies: pd.DataFrame, by: str, name: str) -> Evidence:
+    """Kendall's tau-b between fewest steps and highest `by`; the bootstrap draws seeds."""
+    rng = np.random.default_rng(np.random.SeedSequence(2022))
+    of_environment = policies[policies["environment"] == name].dropna(subset=[by])
+    groups = [rows[["steps", by]].to_numpy() for _, rows in of_environment.groupby("seed")]
+
+    def tau(chosen: Sequence[int]) -> float:
+        steps, values = np.concatenate([groups[i] for i in chosen]).T
+        return float(kendalltau(-steps, values).statistic)
+
+    n = len(groups)
+    drawn = [tau(rng.integers(n, size=n)) for _ in range(1_000)]
+    low, high = np.quantile(drawn, [0.025, 0.975])
+    estimate = tau(range(n))
+    return Evidence(estimate, min(low, estimate), max(high, estimate), seeds=n)
+
+
+def findings(results: Results, policies: pd.DataFrame) -> list[Finding]:
+    """Hold the thirty seeds against the criteria."""
+    rng = np.random.default_rng(np.random.SeedSequence(2023))
+
+    def relative(name: str) -> Evidence:
+        network = steps_of(policies, name, "REINFORCE", "as learned")
+        table = steps_of(policies, name, f"table, {chosen_bins(name)} bins", "greedy")
+        good = network[network <= LEARNED]
+        ratio = table / (np.median(good) if len(good) else np.inf)
+        return Evidence(*bootstrap_interval(ratio, rng=rng), seeds=len(ratio))
+
+    def share(name: str) -> Evidence:
+        table = steps_of(policies, name, f"table, {chosen_bins(name)} bins", "greedy")
+        count = int((table <= LEARNED).sum())
+        return Evidence(*proportion_interval(count, len(table)), seeds=len(table))
+
+    def speed(name: str) -> Evidence:
+        _, seconds = training(results, name)
+        return Evidence(*bootstrap_interval(TIMES[name] / seconds, rng=rng), seeds=len(seconds))
+
+    three_m, three_n, t = CLAIMS
+    cars = ("MountainCar", "MountainCarContinuous")
+    return [
+        three_m.judge(
+            *(agreement(policies, "return", name) for name in ("Acrobot", "MountainCar"))
+        ),
+        three_n.judge(*(relative(name) for name in (*cars, "Acrobot")), *map(share, cars)),
+        t.judge(*(speed(name) for name in TIMES)),
+    ]
+
+
+def agreements(policies: pd.DataFrame) -> pd.DataFrame:
+    """How far steps and returns agree: Kendall's tau, and the share of pairs they order apart."""
+    rows = []
+    for name in ENV:
+        for by, rewards in (("return", "as paid"), ("shaped_return", "shaped")):
+            if by == "shaped_return" and name == "MountainCarContinuous":
+                continue
+            found = agreement(policies, by, name)
+            chosen = policies[policies["environment"] == name].dropna(subset=[by])
+            pairs = np.sign(np.subtract.outer(*[-chosen["steps"].to_numpy()] * 2)) * np.sign(
+                np.subtract.outer(*[chosen[by].to_numpy()] * 2)
+            )
+            rows.append(
+                {
+                    "environment": name,
+                    "rewards": rewards,
+                    "policies": len(chosen),
+                    "Kendall's τ": _minus(
+                        f"{found.estimate:.3f} [{found.low:.3f}, {found.high:.3f}]"
+                    ),
+                    "pairs apart (%)": 100 * np.mean(pairs[np.triu_indices(len(chosen), 1)] < 0),
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def gentle(forces: Sequence[float]) -> pd.DataFrame:
+    """A hand-made driver of MountainCarContinuous: push the way the car moves, so hard only."""
+    world = binned(ENV["MountainCarContinuous"], (1, 2), levels=2)
+    along = np.array([[1.0, 0.0], [0.0, 1.0]])
+    rows = []
+    for force in forces:
+        softer = world._replace(actions=(world.actions * force).astype(np.float32))
+        played = evaluate_table(softer, along, seed=0, episodes=EPISODES, max_steps=10 * CAP)
+        rows.append(
+            {"force": force, "steps": played["steps"].mean(), "return": played["return"].mean()}
+        )
+    return pd.DataFrame(rows)
+
+
+def refinement(found: dict[str, list[Fastest]]) -> pd.DataFrame:
+    """Mean steps of the fastest way, by the values and as driven, on finer and finer grids."""
+    return pd.DataFrame(
+        [
+            {
+                "environment": name,
+                "grid points a dimension": one.points,
+                "steps by the values": one.planned.mean(),
+                "steps as driven": one.driven.mean(),
+                "fewest": int(one.driven.min()),
+                "most": int(one.driven.max()),
+            }
+            for name, grids in found.items()
+            for one in grids
+        ]
+    )
+
+
+def times(results: Results) -> pd.DataFrame:
+    """Seconds of one run, in the report and here."""
+    rows = []
+    for arm, then in TIMES.items():
+        steps, seconds = training(results, arm)
+        rows.append(
+            {
+                "run": arm,
+                "2018 (s)": then,
+                "now (s)": np.median(seconds),
+                "then / now": then / np.median(seconds),
+                "environment steps now": int(np.median(steps)),
+                "processor": results.provenance.set_index("arm")["processor"][arm].iloc[0],
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def costs(results: Results, policies: pd.DataFrame, name: str) -> pd.DataFrame:
+    """What each number of bins costs and brings on a car, one row a seed."""
+    rows = []
+    for bins in BINS:
+        arm = f"{name}, table, {bins} bins"
+        steps, _ = training(results, arm)
+        visits = results.arrays(arm)["visits"]
+        reached = steps_of(policies, name, f"table, {bins} bins", "greedy")
+        rows.append(
+            pd.DataFrame(
+                {
+                    "environment": name,
+                    "bins": bins,
+                    "seed": list(SEEDS),
+                    "steps": reached,
+                    "training_steps": steps,
+                    "entries_visited": (visits > 0).sum(axis=(1, 2)),
+                }
+            )
+        )
+    return pd.concat(rows, ignore_index=True)
+
+
+def by_bins(costs: dict[str, pd.DataFrame], fewest: dict[str, float]) -> pd.DataFrame:
+    """What bins bring and cost: medians over seeds with 95% intervals, and seeds that fail."""
+    rng = np.random.default_rng(np.random.SeedSequence(2025))
+    rows = []
+    for name, table in costs.items():
+        for bins, seeds in table.groupby("bins"):
+            middle, low, high = bootstrap_interval(seeds["steps"].to_numpy(), rng=rng)
+            entries = bins**2 * len(binned(ENV[name], 1, levels=LEVELS[name]).actions)
+            rows.append(
+                {
+                    "environment": name,
+                    "bins": bins,
+                    "cells": bins**2,
+                    "steps": f"{middle:,.0f} [{low:,.0f}, {high:,.0f}]",
+                    "above the fastest": middle - fewest[name],
+                    "seeds above 500": int((seeds["steps"] > LEARNED).sum()),
+                    "training steps (10⁶)": seeds["training_steps"].median() / 1e6,
+                    "entries visited (%)": 100 * seeds["entries_visited"].median() / entries,
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def _minus(text: str) -> str:
+    """Set minus signs, not hyphens."""
+    return text.replace("-", "−")

@@ -1,0 +1,141 @@
+"""Chapter 5's measures on made-up runs whose answers are known."""
+
+import continuous_fates as what_became
+import continuous_figures as drawings
+import continuous_study as study
+import numpy as np
+import pandas as pd
+import pytest
+
+from rl_core.policies import Gaussian
+from rl_core.reinforce import ReinforceConfig
+from rl_core.rollouts import mean_actions
+
+EPISODES = 600
+SIGMA = 0.3
+
+
+def seed_rows(arm, seed, steps, terminated, mean=0.0):
+    """Rows of one seed whose every force costs 0.1 (mean^2 + sigma^2)."""
+    steps, terminated = np.asarray(steps), np.asarray(terminated)
+    rows = pd.DataFrame({"arm": arm, "seed": seed, "steps": steps, "terminated": terminated})
+    rows["episode"] = np.arange(1, len(steps) + 1)
+    rows["return"] = 100.0 * terminated - 0.1 * (mean**2 + SIGMA**2) * steps
+    return rows
+
+
+def made_up(arm, level=200):
+    """Five seeds: good, slow, never out, out and idle, out and pressing."""
+    capped = [True, False, False]
+    return pd.concat(
+        [
+            seed_rows(arm, 0, np.full(EPISODES, level), np.full(EPISODES, True)),
+            seed_rows(arm, 1, np.full(EPISODES, 900), np.full(EPISODES, True)),
+            seed_rows(arm, 2, [500_000, 500_000], [False, False]),
+            seed_rows(arm, 3, [7_000, 500_000, 500_000], capped, mean=0.1),
+            seed_rows(arm, 4, [7_000, 500_000, 500_000], capped, mean=3.0),
+        ]
+    )
+
+
+@pytest.fixture(autouse=True)
+def short(monkeypatch):
+    monkeypatch.setattr(study, "EPISODES", EPISODES)
+    monkeypatch.setattr(study, "SNAPSHOTS", (100,))
+    for module in (study, what_became, drawings):
+        monkeypatch.setattr(module, "SEEDS", range(5))
+
+
+def curves_of(*tables):
+    return study.Curves(pd.concat(tables))
+
+
+def test_fates_by_hand():
+    curves = curves_of(made_up("as reported"))
+    log_sigma = np.full((5, 1), np.log(SIGMA))
+    assert tuple(what_became.fates(curves, "as reported", log_sigma)) == what_became.FATES
+
+
+def test_a_good_seed_stopped_by_its_budget_is_slow_not_stuck():
+    rows = made_up("as reported")
+    rows = rows[rows["seed"] > 0]
+    first = seed_rows("as reported", 0, [*[200] * 400, 50], [*[True] * 400, False])
+    curves = curves_of(first, rows)
+    found = what_became.fates(curves, "as reported", np.full((5, 1), np.log(SIGMA)))
+    assert found[0] == "still slow"
+
+
+def test_measures_by_hand():
+    curves = curves_of(made_up("as reported"))
+    np.testing.assert_array_equal(curves.learned("as reported"), [True, *[False] * 4])
+    at_the_end = [200, 900, np.inf, np.inf, np.inf]
+    np.testing.assert_array_equal(curves.at("as reported", EPISODES), at_the_end)
+    np.testing.assert_array_equal(curves.early("as reported"), [2000, 9000, *[np.inf] * 3])
+    longest = [200, 900, 500_000, 500_000, 500_000]
+    np.testing.assert_array_equal(curves.longest_early("as reported"), longest)
+    np.testing.assert_array_equal(curves.episodes_to("as reported"), [1, *[np.inf] * 4])
+    np.testing.assert_array_equal(curves.spread("as reported"), [0, 0, *[np.inf] * 3])
+    assert curves.final_return("as reported")[0] == pytest.approx(100 - 0.1 * SIGMA**2 * 200)
+    assert np.isneginf(curves.final_return("as reported")[2:]).all()
+    assert study.median_seed(curves, "as reported") == 0
+
+
+def all_arms(level):
+    return study.Curves(pd.concat([made_up(arm, level(arm)) for arm in study.VARIANTS]))
+
+
+def test_claims_are_judged_by_the_numbers(monkeypatch):
+    monkeypatch.setattr(study, "MILESTONES", (EPISODES,))
+    curves = all_arms(lambda arm: 400 if arm == "sigma 1" else 200)
+    at = study.Curves.at
+    monkeypatch.setattr(
+        study.Curves, "at", lambda s, arm, k=None: at(s, arm, min(k or EPISODES, EPISODES))
+    )
+    found = {finding.claim.id: finding for finding in study.findings(curves)}
+    assert list(found) == ["4a", "4b", "4c", "4d", "4e", "4f"]
+    assert found["4a"].answers[1] == "yes"
+    assert found["4b"].answers == ("open",) * 4
+    assert found["4c"].answers[1] == "yes"  # 0.5 converges, 1 does not
+    assert found["4e"].answers[1:] == ("yes", "yes")
+    assert found["4d"].evidence[2].estimate == 3 / 5
+
+
+def test_without_a_seed_that_learned_nothing_is_claimed():
+    curves = all_arms(lambda arm: 700)
+    nothing = study._probability(np.empty(0), np.ones(3), np.random.default_rng(0))
+    assert (nothing.low, nothing.high, nothing.seeds) == (0.0, 1.0, 0)
+    table = study.tradeoff(curves)
+    none = table[(table["arm"] == "sigma 1") & (table["measure"] == "steps")].iloc[0]
+    assert np.isinf([none["low"], none["high"]]).all()
+    assert len(drawings.tradeoff(table).axes) == 6
+
+
+def test_arms_are_the_reports_with_one_thing_changed():
+    arms = {arm.name: arm for arm in study.arms()}
+    reported = arms["as reported"].config
+    assert reported.policy == Gaussian(mean="weights", sigma=0.3)
+    assert (reported.hidden, reported.biases, reported.learning_rate) == ((10, 20), False, 2e-3)
+    assert (reported.batch_size, reported.epochs, reported.gamma) == (512, 1, 0.99)
+    assert reported.normalise == "centre"
+    assert len({repr(arm.config) for arm in arms.values()}) == len(arms)
+
+
+def test_without_constant_and_biases_the_mean_grows_with_the_square_of_the_state():
+    rng = np.random.default_rng(0)
+    weights = {
+        f"layer{i}.weight": rng.normal(size=shape).astype(np.float32)
+        for i, shape in enumerate([(2, 10), (10, 20), (20, 2)])
+    }
+    weights["log_sigma"] = np.zeros(1, np.float32)
+    config = ReinforceConfig(biases=False, policy=Gaussian(mean="weights"))
+    states = rng.normal(size=(20, 2))
+    small, large = (mean_actions(config, weights, c * states) for c in (1.0, 3.0))
+    np.testing.assert_allclose(large, 9 * small, rtol=1e-4, atol=1e-5)
+    assert np.abs(small).min() > 0
+
+
+def test_more_noise_is_out_sooner():
+    strong = what_became.noise_alone(1.0, episodes=10, max_steps=50_000)
+    weak = what_became.noise_alone(0.3, episodes=5, max_steps=2_000)
+    assert np.isfinite(strong).sum() >= 8
+    assert np.isinf(weak).all()

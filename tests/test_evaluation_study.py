@@ -1,0 +1,118 @@
+"""Chapter 6's arms and measures, on made-up evaluations with known answers."""
+
+import evaluation_study as study
+import numpy as np
+import pandas as pd
+import pytest
+
+from rl_core import shaping
+from rl_core.evaluation import evaluate, uniform
+
+
+def _policies(name, steps, returns):
+    """Two agents, as many seeds as there are columns."""
+    rows = []
+    for i, agent in enumerate(("one", "other")):
+        for seed in range(np.shape(steps)[1]):
+            rows.append(
+                {
+                    **dict(zip(study.KEY, (name, agent, "no limit", "greedy"), strict=True)),
+                    "seed": seed,
+                    "steps": steps[i][seed],
+                    "return": returns[i][seed],
+                    "terminated": 1.0,
+                    "shaped_return": np.nan,
+                    "limited_steps": 100.0,
+                    "limited_return": -100.0,
+                    "limited_terminated": 0.5,
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def test_rankings_that_agree_and_that_do_not():
+    steps = np.random.default_rng(0).uniform(100, 500, (2, 30))
+    agree = study.agreement(_policies("MountainCar", steps, -steps), "return", "MountainCar")
+    assert (agree.estimate, agree.low, agree.high) == pytest.approx((1, 1, 1))
+    oppose = study.agreement(_policies("MountainCar", steps, 2 * steps), "return", "MountainCar")
+    assert (oppose.estimate, oppose.high) == pytest.approx((-1, -1))
+    random = np.random.default_rng(1).uniform(size=(2, 30))
+    apart = study.agreement(_policies("MountainCar", steps, random), "return", "MountainCar")
+    assert apart.low < 0 < apart.high
+    assert apart.seeds == 30
+
+
+def test_shaped_returns_are_those_that_dqn_learns_from():
+    for name, shape in (
+        ("Acrobot", shaping.tip_height),
+        ("MountainCar", shaping.distance_from_start),
+    ):
+        seen = []
+
+        def keep(observations, actions, rewards, shape=shape, seen=seen):
+            seen.append(sum(shape(o, 0.0) for o in observations[1:]))
+            return 0.0
+
+        n = 6 if name == "Acrobot" else 2
+        measures = {"ours": study.shaped_return(name), "theirs": keep}
+        table = evaluate(
+            study.ENV[name], uniform(n, 3), seed=0, episodes=3, max_steps=80, measures=measures
+        )
+        np.testing.assert_allclose(table["ours"], seen, rtol=1e-6)
+
+
+def test_the_gentler_the_driver_the_more_it_gets_and_the_longer_it_takes():
+    table = study.gentle((1.0, 0.6, 0.3))
+    assert table["steps"].is_monotonic_increasing
+    assert table["return"].is_monotonic_increasing
+    assert table["return"].iloc[-1] < 100
+
+
+def test_arms_are_paired_with_and_without_the_limit():
+    names = [arm.name for arm in study.arms()]
+    assert len(set(names)) == len(names)
+    for arm in study.reported_arms():
+        name = study.environment_of(arm.name)
+        under = next(one for one in study.arms() if one.name == f"{arm.name}, under the limit")
+        assert under.config.max_episode_steps == study.LIMIT[name]
+        assert arm.config.max_episode_steps != study.LIMIT[name]
+        assert under.config.gamma == arm.config.gamma
+        assert under.env == arm.env
+    assert {study.environment_of(name) for name in names} == set(study.ENV)
+
+
+def test_every_arm_is_tried_out_and_chance_besides():
+    tried = study.tried()
+    assert {one.arm for one in tried} == {arm.name for arm in study.arms()} | {None}
+    assert len({(one.environment, one.agent, one.trained, one.acting) for one in tried}) == len(
+        tried
+    )
+
+
+def test_every_timed_run_and_every_compared_table_has_an_arm():
+    names = {arm.name for arm in study.arms()}
+    assert set(study.TIMES) <= names
+    for name in study.ENV:
+        assert f"{name}, table, {study.chosen_bins(name)} bins" in names
+
+
+def test_the_summary_of_an_environment():
+    steps = np.array([[120.0, 130, 140], [200, 210, 220]])
+    table = study.summary(_policies("MountainCar", steps, -steps), "MountainCar")
+    assert table["steps, no limit"].tolist() == ["130 [120, 140]", "210 [200, 220]"]
+    assert table["return within 200 steps"].iloc[0] == "−100 [−100, −100]"
+    assert table["reached in time (%)"].tolist() == [50, 50]
+
+
+def test_steps_of_an_agent():
+    steps = np.array([[120.0, 130, 140], [200, 210, 220]])
+    policies = _policies("Acrobot", steps, -steps)
+    assert study.steps_of(policies, "Acrobot", "other", "greedy").tolist() == [200, 210, 220]
+    assert study.steps_of(policies, "Acrobot", "other", "as learned").size == 0
+
+
+@pytest.mark.parametrize("name", study.ENV)
+def test_gymnasiums_limits(name):
+    import gymnasium
+
+    assert gymnasium.spec(study.ENV[name]).max_episode_steps == study.LIMIT[name]
