@@ -290,6 +290,27 @@ def tradeoff(curves: Curves) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def tradeoff_text(table: pd.DataFrame) -> pd.DataFrame:
+    """One row an arm, one column a measure, each an estimate with its interval."""
+    names = {
+        "early": "first 10 episodes, mean steps",
+        "learned": "share that learns (%)",
+        "episodes": "episodes to 300 steps",
+        "steps": "steps at 5,000",
+        "spread": "interquartile range",
+        "return": "return at 5,000",
+    }
+    rows = []
+    for arm, measures in table.groupby("arm", sort=False):
+        row = {"arm": arm}
+        for one in measures.itertuples():
+            unit = 100 if one.measure == "learned" else 1
+            interval = Interval(one.estimate * unit, one.low * unit, one.high * unit)
+            row[names[one.measure]] = _text(interval)
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
 def milestones(curves: Curves) -> pd.DataFrame:
     """One row an arm: steps at the milestones with intervals, who learned, what was stopped."""
     rng = np.random.default_rng(np.random.SeedSequence(2018))
@@ -328,6 +349,15 @@ def wall_clock(results: Results) -> pd.DataFrame:
             "processor": [made["processor"].iloc[0]],
         }
     )
+
+
+def learned_sigma(curves: Curves, results: Results) -> str:
+    """Sigma at the end, of the seeds that learned it and the task: median and range."""
+    good = curves.learned("sigma learned")
+    if not good.any():
+        return "none"
+    sigma = np.exp(results.arrays("sigma learned")["log_sigma"][good, 0])
+    return f"{np.median(sigma):.2f} ({sigma.min():.2f} to {sigma.max():.2f})"
 
 
 def median_seed(curves: Curves, arm: str) -> int:
