@@ -62,6 +62,15 @@ def fate_table(curves: Curves, results: Results) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def learned_sigma(curves: Curves, results: Results) -> str:
+    """Sigma at the end, of the seeds that learned it and the task: median and range."""
+    good = curves.learned("sigma learned")
+    if not good.any():
+        return "none"
+    sigma = np.exp(results.arrays("sigma learned")["log_sigma"][good, 0])
+    return f"{np.median(sigma):.2f} ({sigma.min():.2f} to {sigma.max():.2f})"
+
+
 def first_not_learned(curves: Curves, arm: str) -> int:
     """Position of the first seed that got out of the valley and did not learn; else 0."""
     out = curves.rows[arm].groupby("seed")["terminated"].any().reindex(SEEDS).to_numpy()

@@ -9,11 +9,12 @@ were chosen on the same seeds: from its first success on, no seed that learned n
 250,000 steps for an episode, and none needed more than the budget besides its stopped episodes.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from reinforce_study import seeds_to_tell
 from seeds import SEEDS
 
 from rl_core.arm import Arm
@@ -351,15 +352,6 @@ def wall_clock(results: Results) -> pd.DataFrame:
     )
 
 
-def learned_sigma(curves: Curves, results: Results) -> str:
-    """Sigma at the end, of the seeds that learned it and the task: median and range."""
-    good = curves.learned("sigma learned")
-    if not good.any():
-        return "none"
-    sigma = np.exp(results.arrays("sigma learned")["log_sigma"][good, 0])
-    return f"{np.median(sigma):.2f} ({sigma.min():.2f} to {sigma.max():.2f})"
-
-
 def median_seed(curves: Curves, arm: str) -> int:
     """Position of the seed in the middle of those that learned, by their steps at the end.
 
@@ -415,6 +407,31 @@ def findings(curves: Curves) -> list[Finding]:
         ),
         four_f.judge(lower_if_learned(own, middle, end), more_learn(middle, own)),
     ]
+
+
+def closest(curves: Curves, episode: int, steps: float) -> str:
+    """The arm whose seeds that learned come closest to so many steps at an episode."""
+    medians = {
+        arm: np.median(curves.at(arm, episode)[curves.learned(arm)])
+        for arm in curves.raw
+        if curves.learned(arm).sum() > len(SEEDS) / 2
+    }
+    return min(medians, key=lambda arm: abs(medians[arm] - steps), default="as reported")
+
+
+def what_it_would_take(findings: Sequence[Finding]) -> str:
+    """The open criteria, and how many seeds would probably settle each."""
+    parts = []
+    for finding in findings:
+        for number, (criterion, evidence, answer) in enumerate(
+            zip(finding.claim.criteria, finding.evidence, finding.answers, strict=True), 1
+        ):
+            bound = criterion.at_least
+            if answer == "open" and np.isfinite(evidence.high - evidence.low - bound):
+                same = evidence.estimate == bound or evidence.seeds == 0
+                seeds = "no number" if same else f"{seeds_to_tell(evidence, bound):,}"
+                parts.append(f"{finding.claim.id}, criterion {number}: {seeds}")
+    return "; ".join(parts) or "none is open"
 
 
 def _steps(values: np.ndarray, rng: np.random.Generator) -> Evidence:
