@@ -1,5 +1,7 @@
 """Chapter 5: what becomes of seeds that do not learn, and how far noise alone gets."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import pandas as pd
 from continuous_study import ENV, EXTREME, VARIANTS, Curves
@@ -8,7 +10,7 @@ from seeds import SEEDS
 from rl_core.experiments import Results
 from rl_core.policies import Gaussian
 from rl_core.reinforce import ReinforceConfig
-from rl_core.rollouts import rollout
+from rl_core.rollouts import mean_actions, rollout, weights_of
 
 FATES = (
     "learned",
@@ -58,6 +60,28 @@ def fate_table(curves: Curves, results: Results) -> pd.DataFrame:
         names = fates(curves, arm, results.arrays(arm)["log_sigma"])
         rows.append({"arm": arm, **{fate: names.count(fate) for fate in FATES}})
     return pd.DataFrame(rows)
+
+
+def learned_sigma(curves: Curves, results: Results) -> str:
+    """Sigma at the end, of the seeds that learned it and the task: median and range."""
+    good = curves.learned("sigma learned")
+    if not good.any():
+        return "none"
+    sigma = np.exp(results.arrays("sigma learned")["log_sigma"][good, 0])
+    return f"{np.median(sigma):.2f} ({sigma.min():.2f} to {sigma.max():.2f})"
+
+
+def first_not_learned(curves: Curves, arm: str) -> int:
+    """Position of the first seed that got out of the valley and did not learn; else 0."""
+    out = curves.rows[arm].groupby("seed")["terminated"].any().reindex(SEEDS).to_numpy()
+    return int(np.argmax(out & ~curves.learned(arm)))
+
+
+def initial_force(config: ReinforceConfig, arrays: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Size of each seed's untrained mean for a car at rest at the bottom of the valley."""
+    bottom = np.array([[-np.pi / 6, 0.0]])
+    weights = (weights_of(arrays, position, "initial/") for position in range(len(SEEDS)))
+    return np.array([abs(mean_actions(config, one, bottom)[0, 0]) for one in weights])
 
 
 def noise_alone(sigma: float, episodes: int = 100, max_steps: int = 200_000) -> np.ndarray:

@@ -146,7 +146,7 @@ def fate_bars(table: pd.DataFrame) -> Figure:
 
 
 PANELS = {
-    "early": (f"mean length of the first {EARLY}\nepisodes (steps, all seeds)", "log"),
+    "early": (f"length of the first {EARLY} episodes\n(mean steps, all seeds)", "log"),
     "learned": (f"share of seeds that learn\n(at most {LEARNED} steps at the end)", "linear"),
     "episodes": (f"episodes until {CONVERGED} steps\n(seeds that learned)", "linear"),
     "steps": ("steps at episode 5,000\n(seeds that learned)", "linear"),
@@ -157,7 +157,7 @@ PANELS = {
 
 def tradeoff(table: pd.DataFrame) -> Figure:
     """Six measures against sigma, with intervals."""
-    figure, panels = plt.subplots(2, 3, figsize=(9, 6.4))
+    figure, panels = plt.subplots(3, 2, figsize=(6.4, 8.4))
     places = np.arange(len(SIGMAS))
     series = [
         ("two observations", SWEEPS["two observations"], places, BLUE, "o-"),
@@ -182,7 +182,7 @@ def tradeoff(table: pd.DataFrame) -> Figure:
         axes.set_xlim(-0.4, len(places) + 0.4)
         axes.set_title(text, fontsize=9)
         axes.set_xlabel("σ")
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     plt.close(figure)
     return figure
 
@@ -207,43 +207,37 @@ def escapes(steps: Mapping[float, np.ndarray], max_steps: int) -> Figure:
 
 
 def mean_action_maps(
-    config: ReinforceConfig, rows: Mapping[str, Mapping[str, Weights]], points: int = 121
+    config: ReinforceConfig, agents: Mapping[str, Weights], points: int = 121
 ) -> tuple[Figure, pd.DataFrame]:
-    """The mean action over position and velocity, a row an agent and a column a moment.
-
-    Returns the figure and its data.
-    """
+    """The mean action over position and velocity, a panel an agent, and the data drawn."""
     space = gym.make(ENV).observation_space
     grid = state_grid(space, points)
-    n_columns = max(len(moments) for moments in rows.values())
+    extent = (space.low[0], space.high[0], space.low[1], space.high[1])
+    edges = np.linspace(*extent[:2], points), np.linspace(*extent[2:], points)
+    n_rows = -(-len(agents) // 2)
     figure, panels = plt.subplots(
-        *(len(rows), n_columns), figsize=(9, 2.1 + 2.3 * len(rows)), sharex=True, sharey=True
+        *(n_rows, 2), figsize=(6.4, 2.6 * n_rows), sharex=True, sharey=True, squeeze=False
     )
     tables = []
-    for line, (agent, moments) in zip(np.atleast_2d(panels), rows.items(), strict=True):
-        for axes, (moment, weights) in zip(line, moments.items(), strict=True):
-            means = mean_actions(config, weights, grid).reshape(points, points).T
-            extent = (space.low[0], space.high[0], space.low[1], space.high[1])
-            picture = axes.imshow(
-                means,
-                origin="lower",
-                aspect="auto",
-                extent=extent,
-                cmap="PuOr",
-                vmin=-1,
-                vmax=1,
-            )
-            if means.min() < 0 < means.max():
-                shape = np.linspace(*extent[:2], points), np.linspace(*extent[2:], points)
-                axes.contour(*shape, means, levels=[0], colors=BLACK, linewidths=0.8)
-            axes.axvline(-np.pi / 6, color=GREY, lw=0.7, ls=":")
-            axes.grid(visible=False)
-            axes.set_title(f"{agent}\n{moment}", fontsize=9)
-            table = pd.DataFrame(grid, columns=["position", "velocity"])
-            tables.append(table.assign(agent=agent, moment=moment, mean_action=means.T.ravel()))
-        line[0].set_ylabel("velocity (per step)")
-    for axes in np.atleast_2d(panels)[-1]:
+    for axes, (agent, weights) in zip(panels.flat, agents.items(), strict=False):
+        means = mean_actions(config, weights, grid)[:, 0]
+        plane = means.reshape(points, points).T
+        picture = axes.imshow(
+            plane, origin="lower", aspect="auto", extent=extent, cmap="PuOr", vmin=-1, vmax=1
+        )
+        if plane.min() < 0 < plane.max():
+            axes.contour(*edges, plane, levels=[0], colors=BLACK, linewidths=0.8)
+        axes.axvline(-np.pi / 6, color=BLACK, lw=0.7, ls=":")
+        axes.grid(visible=False)
+        axes.set_title(agent, fontsize=9)
+        table = pd.DataFrame(grid, columns=["position", "velocity"])
+        tables.append(table.assign(agent=agent, mean_action=means))
+    for axes in panels[-1]:
         axes.set_xlabel("position")
-    figure.colorbar(picture, ax=panels, label="mean action (force, clipped to ±1)", extend="both")
+    for axes in panels[:, 0]:
+        axes.set_ylabel("velocity (a step)")
+    figure.colorbar(
+        picture, ax=panels, label="mean action (force)", extend="both", shrink=0.5, aspect=30
+    )
     plt.close(figure)
     return figure, pd.concat(tables, ignore_index=True)

@@ -9,11 +9,12 @@ were chosen on the same seeds: from its first success on, no seed that learned n
 250,000 steps for an episode, and none needed more than the budget besides its stopped episodes.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from reinforce_study import seeds_to_tell
 from seeds import SEEDS
 
 from rl_core.arm import Arm
@@ -290,6 +291,27 @@ def tradeoff(curves: Curves) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def tradeoff_text(table: pd.DataFrame) -> pd.DataFrame:
+    """One row an arm, one column a measure, each an estimate with its interval."""
+    names = {
+        "early": "first 10 episodes, mean steps",
+        "learned": "share that learns (%)",
+        "episodes": "episodes to 300 steps",
+        "steps": "steps at 5,000",
+        "spread": "interquartile range",
+        "return": "return at 5,000",
+    }
+    rows = []
+    for arm, measures in table.groupby("arm", sort=False):
+        row = {"arm": arm}
+        for one in measures.itertuples():
+            unit = 100 if one.measure == "learned" else 1
+            interval = Interval(one.estimate * unit, one.low * unit, one.high * unit)
+            row[names[one.measure]] = _text(interval)
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
 def milestones(curves: Curves) -> pd.DataFrame:
     """One row an arm: steps at the milestones with intervals, who learned, what was stopped."""
     rng = np.random.default_rng(np.random.SeedSequence(2018))
@@ -385,6 +407,31 @@ def findings(curves: Curves) -> list[Finding]:
         ),
         four_f.judge(lower_if_learned(own, middle, end), more_learn(middle, own)),
     ]
+
+
+def closest(curves: Curves, episode: int, steps: float) -> str:
+    """The arm whose seeds that learned come closest to so many steps at an episode."""
+    medians = {
+        arm: np.median(curves.at(arm, episode)[curves.learned(arm)])
+        for arm in curves.raw
+        if curves.learned(arm).sum() > len(SEEDS) / 2
+    }
+    return min(medians, key=lambda arm: abs(medians[arm] - steps), default="as reported")
+
+
+def what_it_would_take(findings: Sequence[Finding]) -> str:
+    """The open criteria, and how many seeds would probably settle each."""
+    parts = []
+    for finding in findings:
+        for number, (criterion, evidence, answer) in enumerate(
+            zip(finding.claim.criteria, finding.evidence, finding.answers, strict=True), 1
+        ):
+            bound = criterion.at_least
+            if answer == "open" and np.isfinite(evidence.high - evidence.low - bound):
+                same = evidence.estimate == bound or evidence.seeds == 0
+                seeds = "no number" if same else f"{seeds_to_tell(evidence, bound):,}"
+                parts.append(f"{finding.claim.id}, criterion {number}: {seeds}")
+    return "; ".join(parts) or "none is open"
 
 
 def _steps(values: np.ndarray, rng: np.random.Generator) -> Evidence:
