@@ -1,23 +1,23 @@
 """Chapter 4: learning curves over those of 2018, causes side by side, and a value function."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 import pandas as pd
-from dqn_study import BUDGET, ENV, EPISODES, LEARNED, Curves
+from dqn_study import BUDGET, ENV, EPISODES, LEARNED, PARTS, Curves
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from rl_core.figures import BLACK, BLUE, COLOURS, GREY, LINES, ORANGE, VERMILLION, label
+from rl_core.figures import BLACK, BLUE, COLOURS, GREY, LINES, ORANGE, SKY_BLUE, VERMILLION, label
 from rl_core.q_networks import action_values
 from rl_core.rollouts import Rollout, Weights
 from rl_core.statistics import bootstrap_interval
 
-PARTS = 10  # of the budget, in the curves of steps a goal
+PUSHES = ("left", "none", "right")
+_PUSH_COLOURS = ListedColormap([SKY_BLUE, "#eeeeee", ORANGE])
 
 
 def learning_curve(curves: Curves, name: str, original: pd.DataFrame) -> Figure:
@@ -41,25 +41,10 @@ def learning_curve(curves: Curves, name: str, original: pd.DataFrame) -> Figure:
     if len(stopped):
         text = f"stopped before the goal ({len(stopped)} episodes)"
         axes.plot(stopped["episode"], stopped["steps"], "x", color=BLACK, ms=5, label=text)
-    _median(axes, x, seeds, BLUE, "-", f"median of all {len(seeds)} seeds, 95% interval")
+    text = f"median of all {len(seeds)} seeds, 95% interval"
+    _median(axes, x, seeds, BLUE, "-", text, top=np.nanmax(seeds))
     axes.set_yscale("log")
     label(axes, x="episode", y="steps to the goal (log scale)")
-    figure.legend(loc="outside lower center", ncols=2, fontsize=9)
-    plt.close(figure)
-    return figure
-
-
-def discounts(curves: Curves) -> Figure:
-    """Median and interval for both discounts on both environments."""
-    figure, both = plt.subplots(2, 1, figsize=(6.4, 6.0), sharex=True)
-    x = np.arange(1, EPISODES + 1)
-    for axes, name in zip(both, ENV, strict=True):
-        variants = (("as reported", "γ = 0.99, as reported"), ("gamma 0.9", "γ = 0.9"))
-        for i, (variant, text) in enumerate(variants):
-            smooth = curves.smooth[f"{name}, {variant}"]
-            _median(axes, x, smooth, COLOURS[i], LINES[i], text if name == "Acrobot" else None)
-        axes.set_yscale("log")
-        label(axes, x="episode" if name != "Acrobot" else "", y="steps (log scale)", title=name)
     figure.legend(loc="outside lower center", ncols=2, fontsize=9)
     plt.close(figure)
     return figure
@@ -94,20 +79,15 @@ def shares(curves: Curves, variants: Sequence[str]) -> Figure:
 def over_the_budget(curves: Curves, names: dict[str, str]) -> Figure:
     """Steps a goal in each tenth of the budget: median over seeds and its interval."""
     figure, both = plt.subplots(2, 1, figsize=(6.4, 7.0))
-    edges = np.linspace(0, 1, PARTS + 1)
     for axes, name in zip(both, ENV, strict=True):
-        middles = (edges[1:] + edges[:-1]) / 2 * BUDGET[name] / 1000
+        tenth = BUDGET[name] / PARTS
+        middles = (np.arange(PARTS) + 0.5) * tenth / 1000
         for i, (variant, text) in enumerate(names.items()):
-            arm = f"{name}, {variant}"
-            steps = np.array(
-                [curves.steps_a_goal(arm, low, high) for low, high in pairwise(edges)]
-            ).T
-            _median(
-                *(axes, middles, steps, COLOURS[i], LINES[i]),
-                text if name == "Acrobot" else None,
-                top=BUDGET[name] / PARTS,
-            )
+            steps = curves.parts(f"{name}, {variant}")
+            shown = text if name == "Acrobot" else None
+            _median(axes, middles, steps, COLOURS[i], LINES[i], shown, top=tenth, marker="o")
         axes.set_yscale("log")
+        axes.set_xlim(0, BUDGET[name] / 1000)
         label(axes, x="environment steps (thousands)", y="steps a goal (log scale)", title=name)
     figure.legend(loc="outside lower center", ncols=2, fontsize=9)
     plt.close(figure)
@@ -121,13 +101,13 @@ def _median(
     colour: str,
     line: object,
     text: str | None,
-    top: float | None = None,
+    top: float,
+    marker: str = "",
 ) -> None:
     """Median over seeds; a seed that stopped, or reached no goal, counts as needing for ever."""
     values = np.where(np.isnan(seeds), np.inf, seeds)
     rng = np.random.default_rng(np.random.SeedSequence(2020))
     middle, low, high = bootstrap_interval(values, rng=rng, resamples=2_000)
-    top = top or np.nanmax(seeds)
     axes.fill_between(
         x,
         low,
@@ -138,12 +118,26 @@ def _median(
         lw=0,
     )
     drawn = np.where(np.isinf(middle), np.nan, middle)
-    axes.plot(x, drawn, color=colour, ls=line, marker="." if top and len(x) == PARTS else "")
-    axes.plot([], [], color=colour, ls=line, label=text)
+    axes.plot(x, drawn, color=colour, ls=line, marker=marker, ms=4, label=text)
 
 
-PUSHES = ("left", "none", "right")
-_PUSH_COLOURS = ListedColormap(["#56B4E9", "#eeeeee", ORANGE])
+def plane_table(policies: dict[str, tuple[Weights, Rollout]]) -> pd.DataFrame:
+    """The values behind `state_plane`: `policy, position, velocity` and one value a push."""
+    tables = []
+    for title, (weights, _) in policies.items():
+        grid = _plane()[2]
+        table = pd.DataFrame(grid, columns=["position", "velocity"]).round(5)
+        table[[f"q_{push}" for push in PUSHES]] = action_values(weights, grid)
+        table.insert(0, "policy", title)
+        tables.append(table)
+    return pd.concat(tables, ignore_index=True)
+
+
+def _plane() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions, velocities, and all their pairs, of shape (pairs, 2)."""
+    position, velocity = np.linspace(-1.2, 0.6, 91), np.linspace(-0.07, 0.07, 71)
+    grid = np.stack(np.meshgrid(position, velocity), axis=-1).reshape(-1, 2)
+    return position, velocity, grid
 
 
 def state_plane(policies: dict[str, tuple[Weights, Rollout]]) -> Figure:
@@ -155,8 +149,7 @@ def state_plane(policies: dict[str, tuple[Weights, Rollout]]) -> Figure:
         One row of panels each, by its title.
     """
     figure, panels = plt.subplots(len(policies), 2, figsize=(7.2, 3.3 * len(policies)))
-    position, velocity = np.linspace(-1.2, 0.6, 181), np.linspace(-0.07, 0.07, 141)
-    grid = np.stack(np.meshgrid(position, velocity), axis=-1).reshape(-1, 2)
+    position, velocity, grid = _plane()
     shape = (len(velocity), len(position))
     for row, (title, (weights, episode)) in zip(
         np.atleast_2d(panels), policies.items(), strict=True

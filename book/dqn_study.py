@@ -79,14 +79,13 @@ def mended(name: str, rivals: Sequence[str]) -> DQNConfig:
 
 
 def causes() -> dict[str, tuple[str, ...]]:
-    """What each arm on the original reward mends: none, one, two, all but one, or all causes."""
+    """What each arm on the original reward mends: none, one, all but one, or all causes."""
     alone = {f"original, {rival}": (rival,) for rival in RIVALS}
     but_one = {
         f"original, all but {rival}": tuple(other for other in RIVALS if other != rival)
         for rival in RIVALS
     }
-    two = {"original, terminal flag and biases": ("terminal flag", "biases")}
-    return {"original": (), **alone, **two, **but_one, "original, all four": RIVALS}
+    return {"original": (), **alone, **but_one, "original, all four": RIVALS}
 
 
 def arms() -> list[Arm]:
@@ -307,7 +306,7 @@ def _interval(interval: tuple[float, float, float]) -> str:
 
 
 def milestones(curves: Curves) -> pd.DataFrame:
-    """One row a reported arm: steps at the milestones with intervals, who learned, the capped."""
+    """One row an environment: steps at the milestones with intervals, who learned, the capped."""
     rng = np.random.default_rng(np.random.SeedSequence(2018))
     rows = []
     for arm in curves.smooth:
@@ -315,10 +314,9 @@ def milestones(curves: Curves) -> pd.DataFrame:
         for episode in MILESTONES:
             interval = bootstrap_interval(curves.at(arm, episode), rng=rng)
             row[f"steps at {episode}"] = _interval(interval)
-        for episode in (20, EPISODES):
-            row[f"learned by {episode}"] = (
-                f"{int(curves.learned(arm, episode).sum())} of {len(SEEDS)}"
-            )
+        for episode in (MILESTONES[0], EPISODES):
+            count = int(curves.learned(arm, episode).sum())
+            row[f"learned by {episode}"] = f"{count} of {len(SEEDS)}"
         row["capped episodes"] = int((~curves.table[arm]["terminated"]).sum())
         rows.append(row)
     return pd.DataFrame(rows)
@@ -332,14 +330,38 @@ def to_the_budget(curves: Curves, variants: Sequence[str]) -> pd.DataFrame:
         row = {"variant": variant}
         for name in ENV:
             arm = f"{name}, {variant}"
-            row[f"{name}: steps a goal"] = _interval(
-                bootstrap_interval(curves.steps_a_goal(arm), rng=rng)
-            )
-            share = curves.share(arm)
-            count = round(share[0] * len(SEEDS))
-            row[f"{name}: learned"] = f"{count} of {len(SEEDS)} ({share[1]:.0%} to {share[2]:.0%})"
+            interval = bootstrap_interval(curves.steps_a_goal(arm), rng=rng)
+            row[f"{name}: steps a goal"] = _interval(interval)
+            share, low, high = curves.share(arm)
+            count = round(share * len(SEEDS))
+            row[f"{name}: learned"] = f"{count} of {len(SEEDS)} ({low:.0%} to {high:.0%})"
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def shares(curves: Curves, variants: Sequence[str]) -> pd.DataFrame:
+    """Share of seeds that learned, with its interval: `environment, variant, share, low, high`."""
+    return pd.DataFrame(
+        [
+            (name, variant, *curves.share(f"{name}, {variant}"))
+            for name in ENV
+            for variant in variants
+        ],
+        columns=["environment", "variant", "share", "low", "high"],
+    )
+
+
+def parts(curves: Curves, variants: Sequence[str]) -> pd.DataFrame:
+    """Steps a goal of every seed in every tenth of the budget, one a row."""
+    tables = []
+    for name in ENV:
+        for variant in variants:
+            wide = pd.DataFrame(curves.parts(f"{name}, {variant}"), index=list(SEEDS))
+            long = wide.rename_axis("seed").reset_index().melt("seed", var_name="tenth")
+            long.insert(0, "variant", variant)
+            long.insert(0, "environment", name)
+            tables.append(long.rename(columns={"value": "steps_a_goal"}))
+    return pd.concat(tables, ignore_index=True)
 
 
 def wall_clock(results: Results) -> pd.DataFrame:
@@ -360,9 +382,11 @@ def wall_clock(results: Results) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def median_seed(curves: Curves, name: str) -> int:
-    """Position of the seed in the middle, all ordered by their steps at the end: a rule."""
-    order = np.argsort(curves.at(f"{name}, as reported", EPISODES), kind="stable")
+def median_seed(curves: Curves, arm: str) -> int:
+    """Position of the seed in the middle, all ordered by their steps at the end: not a pick."""
+    reported_arm = arm in curves.smooth
+    steps = curves.at(arm, EPISODES) if reported_arm else curves.steps_a_goal(arm)
+    order = np.argsort(steps, kind="stable")
     return int(order[(len(order) - 1) // 2])
 
 
