@@ -6,7 +6,8 @@ SHELL := bash
 
 PYTHON ?= $(firstword $(shell command -v python3.11 python3))
 BIN := .venv/bin
-NOTEBOOKS := $(wildcard book/[0-9]*.ipynb)
+# In the order in which they are run: the appendices and the front page read what the chapters wrote.
+NOTEBOOKS := $(sort $(wildcard book/[0-9]*.ipynb)) $(sort $(wildcard book/a[0-9]*.ipynb)) book/intro.ipynb
 SITE := _build/html
 # The setting the site was built with is part of the stamp's name: a preview is never taken for the book.
 STAMP := $(SITE)/.complete-$(or $(SEEDS),30)-seeds
@@ -89,11 +90,11 @@ pairing: .venv/.installed ## each notebook says the same as its .py twin and hol
 notebooks: .venv/.installed ## every notebook at full scale (nbmake)
 	$(BIN)/pytest --nbmake --nbmake-timeout=5400 -o faulthandler_timeout=0 $(NOTEBOOKS)
 
-browser: $(STAMP) ## the built book in a headless Chromium: pictures, mathematics, films, search, phone
-	$(BIN)/pytest tests/browser.py
+browser: $(STAMP) ## the built book: claims, links; in a headless Chromium pictures, mathematics, films, search
+	$(BIN)/pytest tests/built_book.py tests/browser.py
 
 sync: .venv/.installed ## write the .ipynb twins anew from the .py files
-	$(BIN)/jupytext --update --to ipynb book/[0-9]*.py
+	$(BIN)/jupytext --update --to ipynb $(NOTEBOOKS:.ipynb=.py)
 
 bench: .venv/.benchmarks ## speed ratios against other libraries, measured now on this machine
 	$(BIN)/python -m bench

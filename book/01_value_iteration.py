@@ -112,7 +112,7 @@ for number, flags in enumerate(maze.flag_sets, start=1):
 #
 # :::{grid-item}
 # ```{glue:figure} fig-1
-# :name: maze-situation-1
+# :name: figure-1
 # :alt: Plan of the maze with no flag held; each free cell shows its value and an arrow for its optimal action.
 #
 # Maze situation 1: no flag held. The goal pays nothing yet, so even beside it the best move is away. From S the arrows lead to A. Hatched cells cannot be entered without taking their flag; their values are those of the model. Data: {download}`CSV <../results/figures/figure_1.csv>`.
@@ -121,7 +121,7 @@ for number, flags in enumerate(maze.flag_sets, start=1):
 #
 # :::{grid-item}
 # ```{glue:figure} fig-2
-# :name: maze-situation-2
+# :name: figure-2
 # :alt: Plan of the maze with flag A held; each free cell shows its value and an arrow for its optimal action.
 #
 # Maze situation 2: flag A held. Flag A is taken (dashed outline). The arrows lead down to C; only beside the goal is one flag in hand worth more than two later, and only beside B is B near enough. Data: {download}`CSV <../results/figures/figure_2.csv>`.
@@ -130,7 +130,7 @@ for number, flags in enumerate(maze.flag_sets, start=1):
 #
 # :::{grid-item}
 # ```{glue:figure} fig-3
-# :name: maze-situation-3
+# :name: figure-3
 # :alt: Plan of the maze with flag B held; each free cell shows its value and an arrow for its optimal action.
 #
 # Maze situation 3: flag B held. All arrows lead to A, but for the cell above C, which takes C first. Even beside the goal it is, just, better to turn back for A than to cash in one flag. Data: {download}`CSV <../results/figures/figure_3.csv>`.
@@ -139,7 +139,7 @@ for number, flags in enumerate(maze.flag_sets, start=1):
 #
 # :::{grid-item}
 # ```{glue:figure} fig-4
-# :name: maze-situation-4
+# :name: figure-4
 # :alt: Plan of the maze with flag C held; each free cell shows its value and an arrow for its optimal action.
 #
 # Maze situation 4: flag C held. The pull is to A. Beside B it is to B, beside the goal to the goal. Data: {download}`CSV <../results/figures/figure_4.csv>`.
@@ -148,7 +148,7 @@ for number, flags in enumerate(maze.flag_sets, start=1):
 #
 # :::{grid-item}
 # ```{glue:figure} fig-5
-# :name: maze-situation-5
+# :name: figure-5
 # :alt: Plan of the maze with flags A and B held; each free cell shows its value and an arrow for its optimal action.
 #
 # Maze situation 5: flags A and B held. Only C is missing. The upper row walks past it to the goal; the lower rows fetch it first. Data: {download}`CSV <../results/figures/figure_5.csv>`.
@@ -157,7 +157,7 @@ for number, flags in enumerate(maze.flag_sets, start=1):
 #
 # :::{grid-item}
 # ```{glue:figure} fig-6
-# :name: maze-situation-6
+# :name: figure-6
 # :alt: Plan of the maze with flags A and C held; each free cell shows its value and an arrow for its optimal action.
 #
 # Maze situation 6: flags A and C held. Only B is missing, in the far corner. Nobody but the cell beside it goes there. Data: {download}`CSV <../results/figures/figure_6.csv>`.
@@ -166,7 +166,7 @@ for number, flags in enumerate(maze.flag_sets, start=1):
 #
 # :::{grid-item}
 # ```{glue:figure} fig-7
-# :name: maze-situation-7
+# :name: figure-7
 # :alt: Plan of the maze with flags B and C held; each free cell shows its value and an arrow for its optimal action.
 #
 # Maze situation 7: flags B and C held. Only A is missing. From its left and from below it is worth a step aside; from its right it is not. Data: {download}`CSV <../results/figures/figure_7.csv>`.
@@ -175,7 +175,7 @@ for number, flags in enumerate(maze.flag_sets, start=1):
 #
 # :::{grid-item}
 # ```{glue:figure} fig-8
-# :name: maze-situation-8
+# :name: figure-8
 # :alt: Plan of the maze with flags A, B and C held; each free cell shows its value and an arrow for its optimal action.
 #
 # Maze situation 8: flags A, B and C held. Every arrow leads to the goal, and a value falls by about an eighth with each cell of distance: the discount, and the chance to slip. Data: {download}`CSV <../results/figures/figure_8.csv>`.
@@ -206,6 +206,7 @@ figures.Film(
 
 # %% [markdown]
 # :::{container} caption
+# :name: film-s1-1
 # **Film S1.1.** The optimal agent (blue disc) and the move it means to make (arrow). Where the floor
 # slips the disc turns orange and the arrow is dotted. Taken flags are dashed outlines.
 # :::
@@ -243,6 +244,7 @@ drawings.convergence(plan.table, gamma=study.GAMMA, threshold=study.THRESHOLD)
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s1-1
 # **Figure S1.1.** Change of the table in each sweep (logarithmic). The residual starts on the
 # bound (dashed) and soon falls well below it. The Frobenius norm (dash-dotted), the report's
 # measure, is never smaller than the residual, so stopping on it is the safer choice. Data: {download}`CSV <../results/figures/figure_s1_1.csv>`.
@@ -279,6 +281,7 @@ drawings.computation(progress)
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s1-2
 # **Figure S1.2.** Largest error of the values against the work done so far. A dot is a sweep of value
 # iteration, a cross a round of policy iteration whose evaluation is done by sweeps. Errors below
 # $10^{-9}$ are rounding and drawn there. Data: {download}`CSV <../results/figures/figure_s1_2.csv>`.
@@ -304,6 +307,7 @@ drawings.coarse_values(report, paths)
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s1-3
 # **Figure S1.3.** States whose greedy action is wrong, against how wrong the values still are. Read
 # from left to right: each step is a sweep. In the shaded part the values are off by more than 1%.
 # Data: {download}`CSV <../results/figures/figure_s1_3.csv>`. What was measured on each maze:

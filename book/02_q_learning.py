@@ -29,6 +29,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import provenance
 import q_learning_figures as drawings
 import q_learning_study as study
 from figure_data import offer, tidy
@@ -78,6 +79,7 @@ RESULTS.mkdir(exist_ok=True)
 # %%
 world = World()
 results = run(study.ARMS, seeds=study.SEEDS, store=RESULTS / "store")
+provenance.keep(results, RESULTS, chapter=2)
 found = study.summary(world, results)
 steps = found["steps_in_all"].sum() / 1e6
 seconds = results.provenance["seconds"].sum()
@@ -104,7 +106,7 @@ glue("distance_2018", study.distance_from_original(norms, original), display=Fal
 
 # %% [markdown]
 # ```{glue:figure} fig-9
-# :name: q-learning-error
+# :name: figure-9
 # :alt: Two line charts of the error against the episode. Above, all seeds and the curve of 2018 fall together from 25 to 8 within about 1,000 episodes and stay there. Below, enlarged, all seeds flatten just above a dashed line at 7.957.
 #
 # Error of Q with exploitation probability 0.1 and step size 0.2. Thin lines: {glue:text}`seeds` seeds. Strong line: their median, with the 95% interval of the median. Behind them the curve of 2018, read off the published plot to within 0.05. Below: the lower end, enlarged. Every seed flattens just above the dashed plateau, which the model gives without any learning; dotted: with the predicted effect of the step size on top. Data: {download}`CSV <../results/figures/figure_9.csv>`.
@@ -156,6 +158,7 @@ drawings.error_split(after[1:], {name: part[:, 1:] for name, part in parts.items
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s2-1
 # **Figure S2.1.** The squared error of figure 9, split by how often entries were visited (mean of {glue:text}`seeds` seeds; the
 # areas add up to the whole). The grey slab never changes. All the learning happens above it.
 # Data: {download}`CSV <../results/figures/figure_s2_1.csv>`.
@@ -192,6 +195,7 @@ drawings.noise_law(left, predicted)
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s2-2
 # **Figure S2.2.** Error in the entries that can be visited at the end of 5,000 episodes, against the step size: every seed,
 # the median, and the prediction from the model, which has no free parameter. The prediction is exact for
 # small steps and a little low for large ones. Smaller steps would end lower, given the time. Data: {download}`CSV <../results/figures/figure_s2_2.csv>`.
@@ -223,6 +227,7 @@ figures.Film(
 
 # %% [markdown]
 # :::{container} caption
+# :name: film-s2-1
 # **Film S2.1.** Figure 9's run with seed 0. Each small maze is one set of flags held; episodes begin in the upper left corner of
 # the first. The darker a cell, the more often it was visited (logarithmic). Arrows: the greedy action, black where it
 # is optimal, hollow where not; none while two actions are tied. Hatched: cannot be entered without taking the flag.
@@ -249,6 +254,7 @@ drawings.wrong_decisions(contested, seeds=len(study.SEEDS))
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s2-3
 # **Figure S2.3.** Each dot is one of the 92 states: by how much its best action leads in $q_*$, and in how many of {glue:text}`seeds`
 # seeds the learned greedy action is wrong. The smaller the lead, the more often
 # the wrong action wins. Data: {download}`CSV <../results/figures/figure_s2_3.csv>`.
@@ -274,6 +280,7 @@ drawings.courses(every + 1, {("error of Q", "RMSE, visitable entries"): courses}
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s2-4
 # **Figure S2.4.** Error over the episodes for three step sizes (logarithmic; every seed, median, 95% band). 0.9 is
 # fast and restless, 0.02 calm and late. Data: {download}`CSV <../results/figures/figure_s2_4.csv>`.
 # :::
@@ -290,6 +297,7 @@ drawings.sweep(
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s2-5
 # **Figure S2.5.** What the step size does (dots: seeds; line: median; band: 95%). Error: mean of the last 500 episodes. Earned:
 # discounted return of the last 1,000 training episodes, as a share of the optimum $v_*(s_0)$ (note the scale). Lost: by
 # following the greedy policy after 5,000 episodes. Data: {download}`CSV <../results/figures/figure_s2_5.csv>`.
@@ -316,6 +324,7 @@ drawings.sweep(
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s2-6
 # **Figure S2.6.** What the exploitation probability does (as in S2.5). Low: every entry is learned and nothing is earned
 # on the way. High: the reverse. From 0.9 on the seeds split: some settle for good on a policy that fetches too few flags.
 # Data: {download}`CSV <../results/figures/figure_s2_6.csv>`.
@@ -362,6 +371,7 @@ drawings.sweep(
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s2-7
 # **Figure S2.7.** What the temperature of softmax does (as in S2.5). It is the same trade-off as in S2.6, mirrored: hot is
 # exploring, cold is exploiting. Data: {download}`CSV <../results/figures/figure_s2_7.csv>`.
 # :::
@@ -431,6 +441,7 @@ drawings.courses(blocks, panels)
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s2-8
 # **Figure S2.8.** Error, and discounted return while learning (means of 100 episodes), for two constant exploitation
 # probabilities and one that rises (every seed, median, 95% band). Data: {download}`CSV <../results/figures/figure_s2_8.csv>`.
 # :::

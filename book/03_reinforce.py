@@ -27,6 +27,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import provenance
 import reinforce_figures as drawings
 import reinforce_study as study
 from figure_data import offer
@@ -87,6 +88,7 @@ pd.DataFrame(
 
 # %%
 results = study.learn(RESULTS / "store")
+provenance.keep(results, RESULTS, chapter=3)
 glue("seeds", len(study.SEEDS), display=False)
 curves = study.Curves(results.table)
 
@@ -108,7 +110,7 @@ for number, name, file in ((10, "Acrobot", "acrobot"), (11, "MountainCar", "moun
 
 # %% [markdown]
 # ```{glue:figure} fig-10
-# :name: acrobot-reinforce
+# :name: figure-10
 # :alt: Learning curves of all seeds on Acrobot over the published curve; most fall from thousands of steps to about a hundred, some never leave the cap.
 #
 # Learning curve for Acrobot-v1 using REINFORCE. Each thin line is a seed (median of its last 100
@@ -124,7 +126,7 @@ for number, name, file in ((10, "Acrobot", "acrobot"), (11, "MountainCar", "moun
 # ## MountainCar
 #
 # ```{glue:figure} fig-11
-# :name: mountaincar-reinforce
+# :name: figure-11
 # :alt: Learning curves of all seeds on MountainCar over the published curve, falling from tens of thousands of steps to a few hundred.
 #
 # Learning curve for MountainCar-v0 using REINFORCE, drawn as Figure 10. The first episodes take
@@ -157,6 +159,7 @@ drawings.variants(curves, "Acrobot", names)
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s3-1
 # **Figure S3.1.** Acrobot: median over {glue:text}`seeds` seeds and its 95% interval for each arm. A seed out of budget counts
 # as needing for ever; where more than half are, the line ends. With γ = 0.9 most seeds learn at first, and then unlearn.
 # Data: {download}`CSV <../results/figures/figure_s3_1.csv>`.
@@ -168,6 +171,7 @@ drawings.variants(curves, "MountainCar", names)
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s3-2
 # **Figure S3.2.** MountainCar: the same. Data: {download}`CSV <../results/figures/figure_s3_2.csv>`.
 # :::
 
@@ -211,6 +215,7 @@ film(
 
 # %% [markdown]
 # :::{container} caption
+# :name: film-s3-1
 # **Film S3.1.** Acrobot before learning (left) and after (right), for as long as the trained agent needs. The seed is number
 # {glue:text}`Acrobot-seed`, the one in the middle when all {glue:text}`seeds` are ordered by their steps at the end.
 # :::
@@ -224,6 +229,7 @@ film(
 
 # %% [markdown]
 # :::{container} caption
+# :name: film-s3-2
 # **Film S3.2.** MountainCar before learning (left) and after (right), seed {glue:text}`MountainCar-seed`,
 # again the one in the middle.
 # :::

@@ -29,6 +29,7 @@ import dqn_figures as drawings
 import dqn_study as study
 import numpy as np
 import pandas as pd
+import provenance
 from myst_nb import glue
 from reinforce_figures import before_and_after
 
@@ -85,6 +86,7 @@ pd.DataFrame(
 
 # %%
 results = study.learn(RESULTS / "store")
+provenance.keep(results, RESULTS, chapter=4)
 curves = study.Curves(results.table)
 
 # %% [markdown]
@@ -105,7 +107,7 @@ for number, name, file in ((12, "Acrobot", "acrobot"), (13, "MountainCar", "moun
 
 # %% [markdown]
 # ```{glue:figure} fig-12
-# :name: acrobot-dqn
+# :name: figure-12
 # :alt: Learning curves of all seeds on Acrobot with DQN and shaped rewards over the published curve, falling within a few episodes from thousands of steps.
 #
 # Learning curve for Acrobot-v1 using DQN with the shaped reward. Each thin line is a seed, unsmoothed as the curve of
@@ -113,7 +115,7 @@ for number, name, file in ((12, "Acrobot", "acrobot"), (13, "MountainCar", "moun
 # ```
 #
 # ```{glue:figure} fig-13
-# :name: mountaincar-dqn
+# :name: figure-13
 # :alt: Learning curves of all seeds on MountainCar with DQN and shaped rewards over the published curve, falling within some ten episodes from ten thousand steps.
 #
 # Learning curve for MountainCar-v0 using DQN with the shaped reward, drawn as Figure 12. Data: {download}`CSV <../results/figures/figure_13.csv>`.
@@ -154,6 +156,7 @@ drawings.over_the_budget(curves, tricks)
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s4-1
 # **Figure S4.1.** Shaped reward: steps a goal in each tenth of the budget, median over seeds and its 95% interval. Where most seeds
 # reached no goal, the line is interrupted. Data: {download}`CSV <../results/figures/figure_s4_1.csv>`.
 # :::
@@ -192,6 +195,7 @@ drawings.shares(curves, variants)
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s4-2
 # **Figure S4.2.** Share of seeds that learn (at most 500 steps a goal in the last quarter of the budget), with its 95% interval.
 # "+" names what is mended with the original reward kept. Data: {download}`CSV <../results/figures/figure_s4_2.csv>`.
 # :::
@@ -215,6 +219,7 @@ drawings.over_the_budget(curves, story)
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s4-3
 # **Figure S4.3.** Steps a goal in each tenth of the budget, drawn as Figure S4.1. Data: {download}`CSV <../results/figures/figure_s4_3.csv>`.
 # :::
 
@@ -247,6 +252,7 @@ drawings.state_plane(policies)
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s4-4
 # **Figure S4.4.** MountainCar: values (left) and greedy push (right). The line is one greedy episode from its start (dot), at most 1,000 steps; dotted:
 # the flag. Without biases (top) all lines of equal push run through the origin, as they must. Data: {download}`CSV <../results/figures/figure_s4_4.csv>`.
 # :::
@@ -274,6 +280,7 @@ film(
 
 # %% [markdown]
 # :::{container} caption
+# :name: film-s4-1
 # **Film S4.1.** Acrobot before learning (left: initial weights, nine actions in ten at random) and after 100 episodes (right: one in ten), seed {glue:text}`Acrobot-seed`, the one in the middle.
 # :::
 
@@ -285,6 +292,7 @@ film(
 
 # %% [markdown]
 # :::{container} caption
+# :name: film-s4-2
 # **Film S4.2.** MountainCar before and after learning, as Film S4.1, seed {glue:text}`MountainCar-seed`.
 # :::
 #

@@ -30,6 +30,7 @@ import continuous_figures as drawings
 import continuous_study as study
 import numpy as np
 import pandas as pd
+import provenance
 from myst_nb import glue
 from reinforce_figures import before_and_after
 from seeds import SEEDS
@@ -81,6 +82,7 @@ pd.DataFrame([{"arm": a.name, "episodes": a.episodes, "seeds": len(SEEDS)} for a
 
 # %%
 results = study.learn(RESULTS / "store")
+provenance.keep(results, RESULTS, chapter=5)
 curves = study.Curves(results.table)
 
 # %% [markdown]
@@ -100,7 +102,7 @@ glue("seeds", len(SEEDS), display=False)
 
 # %% [markdown]
 # ```{glue:figure} fig-14
-# :name: continuous-reinforce
+# :name: figure-14
 # :alt: Learning curves of the seeds on MountainCarContinuous over the published curve. Some fall from tens of thousands of steps to about three hundred; the others end as crosses at the cap, in their first few episodes.
 #
 # Learning curve for MountainCarContinuous-v0 using REINFORCE. Each thin line is a seed (median of its last 100
@@ -136,6 +138,7 @@ drawings.fate_bars(fates)
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s5-1
 # **Figure S5.1.** What became of the seeds of each arm. *Never out*: no episode was finished within the budget. *Idle*: it got out, later an episode did not end,
 # and there the mean force (root mean square) was at most half the engine's. *Pressing*: the same, but the mean force was larger. Data: {download}`CSV <../results/figures/figure_s5_1.csv>`.
 # :::
@@ -162,6 +165,7 @@ drawings.escapes(alone, LONGEST)
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s5-2
 # **Figure S5.2.** The share of 100 episodes in which noise alone has reached the flag within so many steps. Triangles: the steps after which
 # the noise has cost as much as the flag pays. Data: {download}`CSV <../results/figures/figure_s5_2.csv>`.
 # :::
@@ -222,6 +226,7 @@ drawings.tradeoff(tradeoff)
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s5-3
 # **Figure S5.3.** What σ trades, with 95% intervals over seeds. Triangles: the interval has no upper end, because half of the seeds or more were
 # stopped; where the point is missing, so is the median. Final measures are over the seeds that learned, so compare them knowing how many did. Data: {download}`CSV <../results/figures/figure_s5_3.csv>`.
 # :::
@@ -271,6 +276,7 @@ drawings.variants(curves, names)
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s5-4
 # **Figure S5.4.** One thing changed at a time: median of the seeds that learned, with its 95% interval. An arm of which none learned has no line.
 # Data: {download}`CSV <../results/figures/figure_s5_4.csv>`.
 # :::
@@ -303,6 +309,7 @@ picture
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s5-5
 # **Figure S5.5.** The mean action over the state plane; orange is left, purple right. First two rows, the reported settings: seed {glue:text}`good-seed`, the one in the middle of those that learned, by its steps at the end.
 # Last row, γ = 0.9: seed {glue:text}`lost-seed`, the first that got out and did not learn. Black: where the mean changes sign. Dotted: the bottom of the valley.
 # Data: {download}`CSV <../results/figures/figure_s5_5.csv>`.
@@ -327,6 +334,7 @@ before_and_after(
 
 # %% [markdown]
 # :::{container} caption
+# :name: film-s5-1
 # **Film S5.1.** Before learning (left) and after (right), for as long as the trained agent needs. Seed {glue:text}`good-seed`, the same as in Figure S5.5.
 # :::
 #

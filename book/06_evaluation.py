@@ -31,6 +31,7 @@ import evaluation_figures as drawings
 import evaluation_study as study
 import numpy as np
 import pandas as pd
+import provenance
 from myst_nb import glue
 
 from rl_core import figures
@@ -68,6 +69,7 @@ pd.DataFrame(
 
 # %%
 results = study.learn(RESULTS / "store")
+provenance.keep(results, RESULTS, chapter=6)
 episodes = study.evaluate_all(results)
 policies = study.by_seed(episodes)
 
@@ -129,6 +131,7 @@ drawings.all_agents(policies, published)
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s6-1
 # **Figure S6.1.** Return under Gymnasium's time limits, higher is better. Dots: seeds. Marks: their median; bars: its 95% interval. "limit":
 # trained under the limit as well. Diamonds: published results (Table 6.4). Data:
 # {download}`CSV <../results/figures/table_6_1.csv>`.
@@ -208,6 +211,7 @@ drawings.steps_and_returns(policies, by_hand)
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s6-2
 # **Figure S6.2.** Every policy a dot: its mean steps and its mean return, as paid (left) and shaped (right). Where dots lie on one
 # falling line, both rank alike. Data: {download}`CSV <../results/figures/figure_s6_2.csv>`.
 # :::
@@ -284,6 +288,7 @@ drawings.bins(costs, policies, fewest, network)
 
 # %% [markdown]
 # :::{container} caption
+# :name: figure-s6-3
 # **Figure S6.3.** What bins bring and cost. Above: steps that the greedy table needs after training; dots are seeds, the line their
 # median with its 95% interval. Below: environment steps that training took; dashed, the network's. Data:
 # {download}`CSV <../results/figures/figure_s6_3.csv>`.

@@ -15,7 +15,7 @@ import pandas as pd
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
-from rl_core.figures import BLUE
+from rl_core.figures import BLUE, GREY
 
 VERDICTS = {  # in the order of the page: what failed stands first
     "does not hold": "The evidence is against it.",
@@ -197,18 +197,31 @@ def _spoken(table: pd.DataFrame) -> str:
     return ", ".join(f"{count} {verdict}" for verdict, count in counts(table).items())
 
 
+def curves(path: Path) -> pd.DataFrame:
+    """Read a figure's data as one column a seed, with the episode as index.
+
+    It has either columns `episode, seed_0, seed_1, ...` or rows `episode, seed, steps`. A seed that
+    stopped before the end needs for ever from there on.
+    """
+    table = pd.read_csv(path)
+    if "seed" in table:
+        return table.pivot(index="episode", columns="seed", values="steps").fillna(np.inf)
+    return table.set_index("episode").filter(like="seed_")
+
+
 def _thumbnail(number: int, now: pd.DataFrame, original: pd.DataFrame) -> Figure:
     """The curve of 2018 on the left, ours on the right, on the same axes."""
     *_, unit, logarithmic = REPORT_FIGURES[number]
     figure, (left, right) = plt.subplots(1, 2, figsize=(4.4, 1.9), sharex=True, sharey=True)
     middle = original[["low", "high"]].mean(axis=1)
     left.fill_between(original["episode"], original["low"], original["high"], color="#9a8423")
-    left.plot(original["episode"], middle, color="#9a8423", lw=0.6)
-    high = now["high"].where(np.isfinite(now["high"]), now.filter(like="seed_").max(axis=1))
-    right.fill_between(now["episode"], now["low"], high, color=BLUE, alpha=0.3, lw=0)
-    right.plot(now["episode"], now["median"], color=BLUE, lw=1.2, ls="-")
+    left.plot(original["episode"], middle, color="#9a8423", lw=0.6, ls="-")
+    finite = now.replace(np.inf, np.nan)
+    right.plot(finite.index, finite, color=GREY, lw=0.3, ls="-", alpha=0.6)
+    median = now.median(axis=1).replace(np.inf, np.nan)
+    right.plot(median.index, median, color=BLUE, lw=1.4, ls="-")
     left.set_title("2018", fontsize=9)
-    right.set_title(f"now, median of {now.filter(like='seed_').shape[1]}", fontsize=9)
+    right.set_title(f"now, {now.shape[1]} seeds", fontsize=9)
     left.set_ylabel(unit, fontsize=8)
     for axes in (left, right):
         axes.tick_params(labelsize=7)
@@ -238,7 +251,7 @@ def thumbnails(results: Path, originals: Path, situation: Figure) -> str:
     Parameters
     ----------
     results : Path
-        Folder with `figures/figure_09.csv` and so on: `episode, median, low, high, seed_0, ...`.
+        Folder with `figures/figure_9.csv` and so on, as `curves` takes them.
     originals : Path
         Folder with the curves of 2018: `episode, low, high`.
     situation : matplotlib.figure.Figure
@@ -254,9 +267,9 @@ def thumbnails(results: Path, originals: Path, situation: Figure) -> str:
         )
     ]
     for number, (_, title, name, unit, _) in REPORT_FIGURES.items():
-        now = pd.read_csv(results / "figures" / f"figure_{number:02d}.csv")
+        now = curves(results / "figures" / f"figure_{number}.csv")
         original = pd.read_csv(originals / f"{name}.csv")
-        text = f"{title}: {unit} against the episode, the curve of 2018 beside the median of ours."
+        text = f"{title}: {unit} against the episode, the curve of 2018 beside ours."
         figure = _thumbnail(number, now, original)
         cards.append(_card(f"{number}", anchor(f"Figure {number}"), figure, title, text))
     return f'<div class="thumbnails">{"".join(cards)}</div>'

@@ -7,8 +7,8 @@ import pytest
 from jupytext.compare import compare_notebooks
 
 BOOK = Path(__file__).parent.parent / "book"
-NOTEBOOKS = sorted(BOOK.glob("[0-9]*.ipynb"))
-TWINS = sorted(BOOK.glob("[0-9]*.py"))
+NOTEBOOKS = sorted(BOOK.glob("*.ipynb"))
+TWINS = sorted(path for path in BOOK.glob("*.py") if path.read_text().startswith("# ---\n"))
 
 
 def test_every_notebook_has_a_twin_and_every_twin_a_notebook():
