@@ -107,7 +107,7 @@ glue("distance_2018", study.distance_from_original(norms, original), display=Fal
 # %% [markdown]
 # ```{glue:figure} fig-9
 # :name: figure-9
-# :alt: Two line charts of the error against the episode. Above, all seeds and the curve of 2018 fall together from 25 to 8 within about 1,000 episodes and stay there. Below, enlarged, all seeds flatten just above a dashed line at 7.957.
+# :alt: Two line charts of the error against the episode. Above, all seeds and the curve of 2018 fall together and then stay level. Below, enlarged, all seeds flatten just above the dashed line of the plateau.
 #
 # Error of Q with exploitation probability 0.1 and step size 0.2. Thin lines: {glue:text}`seeds` seeds. Strong line: their median, with the 95% interval of the median. Behind them the curve of 2018, read off the published plot to within 0.05. Below: the lower end, enlarged. Every seed flattens just above the dashed plateau, which the model gives without any learning; dotted: with the predicted effect of the step size on top. Data: {download}`CSV <../results/figures/figure_9.csv>`.
 # ```
@@ -149,7 +149,7 @@ figures.captioned(
 # have forgotten where they began. What is left there is mostly *noise*: each update moves the entry a fifth of
 # the way to the latest sample, so it keeps jumping about its true value as a move slips or does not.
 
-# %% tags=["hide-input"] mystnb={"image": {"alt": "Stacked areas of the squared error against the episode on a logarithmic axis: entries never visited vanish by episode 100, rarely visited ones by episode 1,000, and a grey slab of height 63, the entries that cannot be visited, remains to the end."}}
+# %% tags=["hide-input"] mystnb={"image": {"alt": "Stacked areas of the squared error against the episode on a logarithmic axis: entries never visited vanish first, then rarely visited ones, and a grey slab, the entries that cannot be visited, remains to the end."}}
 arrays = results.arrays(study.FIGURE_9.name)
 after = np.array(study.FIGURE_9.snapshots)
 parts = world.split(arrays["Q_snapshots"], arrays["visits_snapshots"], study.STEP_SIZE)
@@ -239,7 +239,7 @@ figures.Film(
 # The report says that despite the gap the greedy policy equals the optimal one in every state. Look closely, and it
 # does not: in the median seed {glue:text}`states_right:.0f` of the 92 states are decided rightly.
 
-# %% tags=["hide-input"] mystnb={"image": {"alt": "Scatter chart: share of seeds in which a state is decided wrongly, against the lead of its best action. States with a lead below 0.005 are wrong in about half of the seeds; with a lead above 0.05 hardly any is."}}
+# %% tags=["hide-input"] mystnb={"image": {"alt": "Scatter chart: share of seeds in which a state is decided wrongly, against the lead of its best action. The share falls as the lead grows."}}
 glue("states_right", float(np.median((~world.wrong(arrays["Q"])).sum(axis=1))), display=False)
 of_figure_9 = found[found["arm"] == study.FIGURE_9.name]
 spread = float(of_figure_9["error"].median())
@@ -310,7 +310,7 @@ drawings.sweep(
 #
 # The report: exploit with probability 0.8 to 0.9 to do well, with 0.1 to 0.2 to learn well.
 
-# %% tags=["hide-input"] mystnb={"image": {"alt": "Four charts against the exploitation probability: the error rises fifty-fold from 0.2 to 0.7; entries never visited rise from 0 to 15 percent; what is earned rises from 3 to about 80 percent of the optimum; from 0.9 on the greedy policy of many seeds loses a fifth."}}
+# %% tags=["hide-input"] mystnb={"image": {"alt": "Four charts against the exploitation probability: the error and the share of entries never visited against what is earned while learning, and what the greedy policy loses."}}
 swept = study.swept(
     world, found, {x: arm.name for x, arm in study.BY_EXPLOITATION.items()}, "exploitation"
 )

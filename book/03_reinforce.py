@@ -268,8 +268,8 @@ glue("seeds-3e", study.seeds_to_tell(three_e.evidence[0], 0.5), display=False)
 
 # %% [markdown]
 # Where the table says "cannot tell", an interval holds the bound. If the estimates stayed what they are, it would take
-# about {glue:text}`seeds-3e` seeds to tell for 3e. In 3d the first half, that one layer does as well, is refuted; how often
-# two layers are slower would take about {glue:text}`seeds-3d` seeds.
+# about {glue:text}`seeds-3e` seeds to tell for 3e, and about {glue:text}`seeds-3d` to tell how often two layers are slower (3d); whether
+# one layer does as well is answered in Table 3.4.
 #
 # **What to take along.** The step the report leaves out is the one that matters most. Without normalised returns
 # {glue:text}`acrobot-raw-returns` of {glue:text}`seeds` seeds learn Acrobot and {glue:text}`mountaincar-raw-returns` learn MountainCar. All rewards are negative, so every raw return says "less of this", and the

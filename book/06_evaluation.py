@@ -140,17 +140,16 @@ drawings.all_agents(policies, published)
 # Three things stand out.
 #
 # **Noise is part of the policy.** As learned, REINFORCE gets to Acrobot's goal in {glue:text}`acrobot-reached:.0f`% of all episodes.
-# Greedy, the same networks do so in {glue:text}`acrobot-greedy-reached:.0f`%; on MountainCar it is {glue:text}`car-reached:.0f`% and {glue:text}`car-greedy-reached:.0f`%. A greedy
-# pendulum that pushes the same way in every state near the bottom only sways about a tilted rest, held there by its own
-# push, for ever. In training this cannot happen, because now and then a random action shakes it loose. REINFORCE optimises the
+# Greedy, the same networks do so in {glue:text}`acrobot-greedy-reached:.0f`%; on MountainCar it is {glue:text}`car-reached:.0f`% and {glue:text}`car-greedy-reached:.0f`%. In the episodes
+# we looked at, a greedy pendulum that failed pushed the same way in every state near the bottom and swayed about a tilted rest, held there by its own
+# push (how often this is the reason we did not count). In training a random action now and then shakes it loose. REINFORCE optimises the
 # policy *with* its noise, and has no reason to make the one without it work. Reporting the greedy policy, as is
 # customary, would report an agent that nobody trained.
 #
 # **What time limits do to training.** MountainCar's limit is 200 steps, and a random car hardly ever gets out of the valley
 # in 200 steps. So all episodes look alike, each is cut off with a return of −200, and there is nothing to prefer. Trained under the limit REINFORCE
 # reaches the goal in time in {glue:text}`car-under-in-time:.0f`% of the episodes; trained without, in {glue:text}`car-in-time:.0f`%. On
-# Acrobot the limit is milder, {glue:text}`acrobot-under-in-time:.0f`% against {glue:text}`acrobot-in-time:.0f`%: a random pendulum gets
-# there within it often enough. That the report left the limits out is not a detail. It is what made its results possible on MountainCar.
+# Acrobot the limit is milder, {glue:text}`acrobot-under-in-time:.0f`% against {glue:text}`acrobot-in-time:.0f`%. That the report left the limits out is not a detail. It is what made its results possible on MountainCar.
 #
 # **What time limits do to evaluation.** A mean of a few hundred steps without a limit is a good agent on a bad day. Under a limit of
 # 200 it counts as a failure, and returns no longer tell it from one that sits still.

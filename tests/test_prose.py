@@ -17,10 +17,12 @@ ROOT = Path(__file__).parent.parent
 BOOK = ROOT / "book"
 CHAPTERS = sorted(BOOK.glob("[0-9]*.ipynb"))
 SMALL = 12  # what is counted by looking at the page or at the method
-CONSTANTS = {  # numbers of the worlds and of the text, which no run changes
-    "01_value_iteration": set(),
-    "02_q_learning": set(),
-    "03_reinforce": set(),
+CONSTANTS = {  # numbers of the worlds and of the sources, which no run changes
+    "01_value_iteration": {14, 112},  # free cells, states
+    "02_q_learning": {112, 92, 368},  # states, those that can be visited alive, their entries
+    "05_continuous_reinforce": {0.07, 90, 10_000, 30},  # top speed, return that counts as solved,
+    # an episode's length in an example, the number of seeds in the question
+    "06_evaluation": {600, 256, 84},  # episodes and widths of the published agents
 }
 EVERYWHERE = {2018, 95, 29}  # the year of the report, the intervals, the last seed
 NUMBER = re.compile(r"(?<![\w.])\d+(?:,\d{3})*(?:\.\d+)?(?![\w]|\.\d)")
