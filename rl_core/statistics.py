@@ -194,11 +194,12 @@ def probability_of_improvement(
     for name, values in (("a", a), ("b", b)):
         if values.ndim != 1 or np.isnan(values).any():
             raise ValueError(f"{name} has shape {values.shape}; allowed is (seeds,) without NaN")
-    better = (a[:, None] < b) + (a[:, None] == b) / 2
-    drawn_a = _seed_counts(len(a), resamples, rng) / len(a)
-    drawn_b = _seed_counts(len(b), resamples, rng) / len(b)
-    low, high = _limits(np.sum((drawn_a @ better) * drawn_b, axis=1), level)
-    return Interval(float(better.mean()), float(low), float(high))
+    # Counted in halves, whole numbers: rounding cannot push the limits past the estimate.
+    halves = 2.0 * (a[:, None] < b) + (a[:, None] == b)
+    drawn_a, drawn_b = (_seed_counts(len(arm), resamples, rng) for arm in (a, b))
+    all_pairs = 2.0 * len(a) * len(b)
+    low, high = _limits(np.sum((drawn_a @ halves) * drawn_b, axis=1) / all_pairs, level)
+    return Interval(float(halves.sum() / all_pairs), float(low), float(high))
 
 
 def proportion_interval(successes: int, trials: int, *, level: float = 0.95) -> Interval:

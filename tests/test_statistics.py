@@ -387,3 +387,10 @@ def test_criteria_refuse(function, arguments):
         function(np.zeros((2, 4)), 1.0, **arguments)
     with pytest.raises(ValueError, match=r"curves has shape \(4,\)"):
         function(np.zeros(4), 1.0, **arguments)
+
+
+@pytest.mark.parametrize("seeds", [3, 7, 29, 30])
+def test_certain_improvement_is_exactly_certain(seeds):
+    rng = np.random.default_rng(0)
+    found = probability_of_improvement(np.zeros(seeds), np.ones(seeds), rng=rng, resamples=500)
+    assert found == (1.0, 1.0, 1.0)
