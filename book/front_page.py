@@ -162,9 +162,8 @@ def _row(row: pd.Series) -> str:
 
 
 def chapter_of(row: pd.Series) -> int:
-    """The chapter that judges a claim: that of the figure or table it points to."""
-    target = re.search(r"(?:Figure|Table|Film)s? S?\d+(?:\.\d+)?", row["figure"])
-    page = anchor(target[0].replace("s ", " ")).partition(".")[0]
+    """The chapter that judges a claim: that of the first figure or table it points to."""
+    page = re.search(r'href="(\w+)\.html', linked(row["figure"]))[1]
     return next(chapter for chapter, name in PAGES.items() if name == page)
 
 

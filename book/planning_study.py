@@ -85,7 +85,7 @@ CLAIMS = (
             ),
             Criterion("the same, median over random mazes", at_least=100),
         ),
-        "S1.3",
+        "Figure S1.3",
     ),
     Claim(
         "1e",
