@@ -267,7 +267,7 @@ glue("seeds-3d", study.seeds_to_tell(three_d.evidence[1], 0.1), display=False)
 glue("seeds-3e", study.seeds_to_tell(three_e.evidence[0], 0.5), display=False)
 
 # %% [markdown]
-# Where the table says "cannot tell", an interval holds the bound. If the estimates stayed what they are, it would take
+# Where a criterion is "open", its interval holds the bound. If the estimates stayed what they are, it would take
 # about {glue:text}`seeds-3e` seeds to tell for 3e, and about {glue:text}`seeds-3d` to tell how often two layers are slower (3d); whether
 # one layer does as well is answered in Table 3.4.
 #

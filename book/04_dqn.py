@@ -322,4 +322,18 @@ figures.captioned(verdicts(findings), "Table 4.5. The report's claims about DQN.
 figures.captioned(details(findings), "Table 4.6. Each criterion with its evidence.")
 
 # %% [markdown]
-# **What to take along.** TO BE WRITTEN
+# **What to take along.** On MountainCar's original reward {glue:text}`MountainCar-original` of {glue:text}`seeds` seeds learn, and
+# {glue:text}`MountainCar-ever` ever see the goal during their budget. No single change mends that: with the terminal flag alone
+# {glue:text}`MountainCar-original, terminal flag` learn, with exploration alone {glue:text}`MountainCar-original, exploration`, with the long memory alone {glue:text}`MountainCar-original, long memory`, with
+# biases alone {glue:text}`MountainCar-original, biases`. With all four together {glue:text}`MountainCar-original, all four` do, and the reward is still −1 a step and replay is
+# still on. Which of the four are needed shows when one is taken away again: without biases {glue:text}`MountainCar-original, all but biases` learn, without the
+# terminal flag {glue:text}`MountainCar-original, all but terminal flag`, without exploration {glue:text}`MountainCar-original, all but exploration`, without the long memory {glue:text}`MountainCar-original, all but long memory`.
+# A cause whose absence stops the learning is needed; one whose absence does not is no cause.
+#
+# Acrobot is another case. There the original reward is not hopeless as it is: {glue:text}`Acrobot-original` of {glue:text}`seeds` seeds learn, with biases alone
+# {glue:text}`Acrobot-original, biases`, with all four {glue:text}`Acrobot-original, all four`. Random torques reach the line now and then, the last step's 0 leaves a
+# signal behind, and the network can draw what it has to.
+#
+# Was it replay? Without replay {glue:text}`MountainCar-original, no replay` of {glue:text}`seeds` seeds learn MountainCar's original reward and {glue:text}`Acrobot-original, no replay` Acrobot's.
+# Shaping did not help by giving replay something to see. It pays for swinging high, which is exploration, and its values can be learned without
+# the end of the episode and without biases. It also has a price: chapter 6 shows that the return it adds up to ranks policies the wrong way round.

@@ -92,11 +92,11 @@ for name, key in (
     free = chosen(name, "REINFORCE", "no limit", "as learned")
     greedy = chosen(name, "REINFORCE", "no limit", "greedy")
     under = chosen(name, "REINFORCE", "time limit", "as learned")
-    glue(f"{key}-reached", 100 * free["terminated"].mean(), display=False)
-    glue(f"{key}-greedy-reached", 100 * greedy["terminated"].mean(), display=False)
-    glue(f"{key}-in-time", 100 * free["limited_terminated"].mean(), display=False)
-    glue(f"{key}-under-in-time", 100 * under["limited_terminated"].mean(), display=False)
-    glue(f"{key}-under-reached", 100 * under["terminated"].mean(), display=False)
+    glue(f"{key}-reached", float(100 * free["terminated"].mean()), display=False)
+    glue(f"{key}-greedy-reached", float(100 * greedy["terminated"].mean()), display=False)
+    glue(f"{key}-in-time", float(100 * free["limited_terminated"].mean()), display=False)
+    glue(f"{key}-under-in-time", float(100 * under["limited_terminated"].mean()), display=False)
+    glue(f"{key}-under-reached", float(100 * under["terminated"].mean()), display=False)
 
 # %% [markdown]
 # ## Every agent on every environment

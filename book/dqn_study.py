@@ -179,7 +179,7 @@ CLAIMS = (
                 Criterion(
                     f"{name}: probability that a seed with the shaped reward needs fewer steps a "
                     "goal there than one with the original reward, above 0.5",
-                    at_least=0.5,
+                    above=0.5,
                 ),
             )
         ),
@@ -196,12 +196,12 @@ CLAIMS = (
                 Criterion(
                     f"{name}, better: probability that a seed with 0.99 needs fewer steps a goal "
                     "in the last quarter of the budget than one with 0.9, shaped reward, above 0.5",
-                    at_least=0.5,
+                    above=0.5,
                 ),
                 Criterion(
                     f"{name}, faster: probability that it gets to 200 steps a goal in fewer tenths "
                     "of the budget, above 0.5",
-                    at_least=0.5,
+                    above=0.5,
                 ),
             )
         ),
@@ -216,7 +216,7 @@ CLAIMS = (
                 f"{name}, shaped reward: probability that a seed with replay needs fewer steps a "
                 "goal in the last quarter of the budget than one that learns from its latest 32 "
                 "steps, above 0.5",
-                at_least=0.5,
+                above=0.5,
             )
             for name in ENV
         ),
@@ -230,7 +230,7 @@ CLAIMS = (
             Criterion(
                 f"{name}, shaped reward: probability that a seed with fixed targets needs fewer "
                 "steps a goal in the last quarter of the budget than one without, above 0.5",
-                at_least=0.5,
+                above=0.5,
             )
             for name in ENV
         ),
@@ -252,7 +252,7 @@ CLAIMS = (
                 Criterion(
                     f"{name}: probability that a seed without replay needs fewer steps a goal "
                     "than one with it, on the original reward, above 0.5",
-                    at_least=0.5,
+                    above=0.5,
                 ),
             )
         ),

@@ -18,8 +18,8 @@ from matplotlib.figure import Figure
 from rl_core.figures import BLUE, GREY
 
 VERDICTS = {  # in the order of the page: what failed stands first
-    "does not hold": "The evidence is against it.",
-    "holds in part": "One half of it is borne out, another is not.",
+    "does not hold": "No criterion is met, and at least one is missed by its whole interval.",
+    "holds in part": "One part of it is borne out, another is not.",
     "cannot tell": "The interval holds the bound: more seeds would be needed.",
     "holds": "Every criterion is met by the whole of its interval.",
 }

@@ -59,8 +59,8 @@ HTML(front_page.claims_table(claims))
 
 # %% [markdown]
 # The table as {download}`claims.csv <../results/claims.csv>`. A claim holds if all its criteria are met by the whole of their 95%
-# intervals, does not hold if all are missed by the whole, holds in part if some are met and others not; otherwise the seeds
-# are too few to tell.
+# intervals, and holds in part if only some are. If none is met and at least one is missed by its whole interval, it does not hold. Otherwise,
+# all intervals holding their bounds, the seeds are too few to tell.
 #
 # ## The report's figures, then and now
 

@@ -17,7 +17,7 @@ from rl_core.planning import value_iteration
 from rl_core.reinforce import ReinforceConfig, reinforce
 
 ROUNDS = 3
-SEEDS = (1, 2, 4, 8, 16)
+SEED_COUNTS = (1, 2, 4, 8, 16)
 EPISODES = (25, 50, 100, 200, 400)
 SIDES = (12, 40, 125, 395)  # of random mazes with three flags: about 10³ to 10⁶ states
 
@@ -41,7 +41,7 @@ def _train(seeds: int, episodes: int) -> None:
 def by_seeds() -> pd.DataFrame:
     """Seconds of 50 episodes of REINFORCE against the number of seeds."""
     _train(1, 1)  # compiles
-    rows = [(seeds, _seconds(lambda seeds=seeds: _train(seeds, 50))) for seeds in SEEDS]
+    rows = [(seeds, _seconds(lambda seeds=seeds: _train(seeds, 50))) for seeds in SEED_COUNTS]
     return pd.DataFrame(rows, columns=["seeds", "seconds"])
 
 

@@ -87,11 +87,11 @@ CLAIMS = (
             Criterion(
                 "better: probability that a seed with 0.99 needs fewer steps at episode 2,000 than "
                 "one with 0.9, above 0.5",
-                at_least=0.5,
+                above=0.5,
             ),
             Criterion(
                 "faster: probability that it gets to 200 steps in fewer episodes, above 0.5",
-                at_least=0.5,
+                above=0.5,
             ),
         ),
         "Figure S3.1",
@@ -131,7 +131,7 @@ CLAIMS = (
             Criterion(
                 "probability that a seed with two layers needs fewer steps at episode 2,000 than "
                 "one with one layer, above 0.5",
-                at_least=0.5,
+                above=0.5,
             ),
         ),
         "Figure S3.1",

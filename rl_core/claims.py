@@ -64,11 +64,14 @@ class Criterion:
         The criterion in words, with the quantity, its unit and the bound.
     at_least, at_most : float
         The bounds, both included.
+    above : float
+        A lower bound that is not included.
     """
 
     text: str
     at_least: float = -math.inf
     at_most: float = math.inf
+    above: float = -math.inf
 
     def answer(self, evidence: Evidence) -> Answer:
         """Say "yes" if the whole interval is within the bounds, "no" if all of it is outside.
@@ -81,11 +84,15 @@ class Criterion:
         >>> criterion.answer(Evidence(90, 80, 110, seeds=30))
         'open'
         """
-        if self.at_least <= evidence.low and evidence.high <= self.at_most:
+        low, high = evidence.low, evidence.high
+        if self.at_least <= low and high <= self.at_most and self._above(low):
             return "yes"
-        if evidence.high < self.at_least or self.at_most < evidence.low:
+        if high < self.at_least or self.at_most < low or not self._above(high):
             return "no"
         return "open"
+
+    def _above(self, value: float) -> bool:
+        return self.above < value or self.above == -math.inf
 
 
 @dataclass(frozen=True)
@@ -115,8 +122,9 @@ class Claim:
     def judge(self, *evidence: Evidence) -> "Finding":
         """Hold the evidence, one piece a criterion, against the criteria.
 
-        All answers yes: the claim holds. All no: it does not. Some yes, others not: it holds in
-        part. Otherwise the data cannot tell.
+        All answers yes: the claim holds. Some yes, others not: it holds in part. None yes, but some
+        no: it does not hold, because all of it would have to be true. Otherwise, all being open,
+        the data cannot tell.
 
         Raises
         ------
@@ -150,9 +158,9 @@ class Finding:
         """What the answers come to."""
         if all(answer == "yes" for answer in self.answers):
             return "holds"
-        if all(answer == "no" for answer in self.answers):
-            return "does not hold"
-        return "holds in part" if "yes" in self.answers else "cannot tell"
+        if "yes" in self.answers:
+            return "holds in part"
+        return "does not hold" if "no" in self.answers else "cannot tell"
 
     def row(self) -> dict[str, object]:
         """Give the finding as a row of the table of claims."""

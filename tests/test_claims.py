@@ -29,12 +29,27 @@ def test_a_criterion_looks_at_the_whole_interval(low, high, answer):
         ((5, 5), (0, 0.5), "holds in part"),
         ((5, 5), (0, 2), "holds in part"),
         ((9, 11), (0, 2), "cannot tell"),
-        ((9, 11), (0, 0.5), "cannot tell"),
+        ((9, 11), (0, 0.5), "does not hold"),
     ],
 )
 def test_verdicts(first, second, verdict):
     evidence = [Evidence(low, low, high, seeds=30) for low, high in (first, second)]
     assert claim(FEW, MANY).judge(*evidence).verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "answer"),
+    [
+        (0.5, 0.7, "open"),
+        (0.51, 0.7, "yes"),
+        (0.3, 0.5, "no"),
+        (0.5, 0.5, "no"),
+        (0.4, 0.6, "open"),
+    ],
+)
+def test_above_does_not_include_its_bound(low, high, answer):
+    criterion = Criterion("above a half", above=0.5)
+    assert criterion.answer(Evidence(low, low, high, seeds=30)) == answer
 
 
 def test_every_criterion_needs_its_evidence():
