@@ -31,7 +31,7 @@ export SDL_VIDEODRIVER := dummy
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PYDEVD_DISABLE_FILE_VALIDATION := 1
 
-.PHONY: help setup book pdf test lint types unit pairing notebooks browser sync bench clean
+.PHONY: help setup book pdf picture test lint types unit pairing notebooks browser sync bench clean
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -71,6 +71,9 @@ _build/book.pdf: $(STAMP)
 	SEEDS=$(SEEDS) $(BIN)/jupyter-book build $(or $(PREVIEW),.) --path-output . --builder singlehtml
 	@cp _build/singlehtml/book/intro.html _build/singlehtml/printed.html
 	$(BIN)/python book/paper.py _build/singlehtml/printed.html $@
+
+picture: $(STAMP) ## take the README's picture from the built front page (needs Chromium)
+	$(BIN)/python book/portrait.py $(SITE)/book/intro.html .github/readme.png
 
 test: lint types unit pairing notebooks browser ## all that has to pass: style, types, tests, notebooks, pages
 

@@ -72,8 +72,14 @@ situation = maze_figures.situation_figure(
 display(HTML(front_page.thumbnails(RESULTS, Path("data/original"), situation)))
 
 # %% [markdown]
-# A picture leads to its figure. Vertical scales are logarithmic, except for the Maze. The figures of the Maze are the only ones of which
-# no data of 2018 exists.
+# :::{container} caption
+# Left the published curve, right the median (blue) over all seeds (grey). A picture leads to its figure. Vertical scales are
+# logarithmic, except for the Maze, whose first eight figures have no data of 2018. Data of Figures
+# {download}`1 to 8 <../results/maze_q_values.csv>`, {download}`9 <../results/figures/figure_9.csv>`,
+# {download}`10 <../results/figures/figure_10.csv>`, {download}`11 <../results/figures/figure_11.csv>`,
+# {download}`12 <../results/figures/figure_12.csv>`, {download}`13 <../results/figures/figure_13.csv>`,
+# {download}`14 <../results/figures/figure_14.csv>`.
+# :::
 #
 # ## What it took
 
