@@ -185,6 +185,12 @@ def rounding_error(mdp: MDP, magnitude: float) -> float:
     Each product, sum and quotient is off by ε/2 at most, relative to its size: 2 K of them for the
     reward, K + 2 for a value, and the quotient by 1 - γ l comes to one more. That is
     (3 K + 3) ε/2, rounded up to 2 (K + 1) ε.
+
+    Examples
+    --------
+    >>> lake = MDP.from_env("FrozenLake-v1")  # K = 3
+    >>> rounding_error(lake, magnitude=1.0) == 8 * 2.0**-52
+    True
     """
     return float(2 * (mdp.n_successors + 1) * np.finfo(np.float64).eps * magnitude)
 
@@ -194,6 +200,11 @@ def error_bound(residual: float, gamma: float, rounding: float) -> float:
 
     It is (γ residual + rounding) / (1 - γ), where γ makes room for rows of probabilities that add
     up to a little more than 1, as `MDP` lets them.
+
+    Examples
+    --------
+    >>> round(error_bound(residual=1e-5, gamma=0.9, rounding=0.0), 9)
+    9e-05
     """
     factor = gamma * (1 + SUM_TOLERANCE)
     return (factor * residual + rounding) / (1 - factor) if factor < 1 else math.inf
@@ -207,7 +218,14 @@ def sweeps_needed(change: float, target: float, gamma: float) -> int:
 
 
 def check_model(mdp: object, gamma: object) -> None:
-    """Raise unless `mdp` is a model and `gamma` a discount below 1."""
+    """Raise unless `mdp` is a model and `gamma` a discount below 1.
+
+    Examples
+    --------
+    >>> check_model(MDP.from_env("FrozenLake-v1"), 1.0)
+    Traceback (most recent call last):
+    ValueError: gamma must lie in [0, 1), it is 1.0
+    """
     if not isinstance(mdp, MDP):
         raise TypeError(f"mdp must be an MDP (see MDP.from_env), not {type(mdp).__name__}")
     if isinstance(gamma, bool) or not isinstance(gamma, Real):
@@ -217,7 +235,14 @@ def check_model(mdp: object, gamma: object) -> None:
 
 
 def check_positive(name: str, value: object) -> None:
-    """Raise unless `value` is a positive finite number."""
+    """Raise unless `value` is a positive finite number.
+
+    Examples
+    --------
+    >>> check_positive("threshold", 0)
+    Traceback (most recent call last):
+    ValueError: threshold must be positive and finite, it is 0
+    """
     if isinstance(value, bool) or not isinstance(value, Real):
         raise TypeError(f"{name} must be a number, not {type(value).__name__}")
     if not 0 < float(value) < math.inf:
@@ -225,7 +250,14 @@ def check_positive(name: str, value: object) -> None:
 
 
 def check_count(name: str, value: object) -> None:
-    """Raise unless `value` is an integer of at least 1."""
+    """Raise unless `value` is an integer of at least 1.
+
+    Examples
+    --------
+    >>> check_count("max_sweeps", 2.5)
+    Traceback (most recent call last):
+    TypeError: max_sweeps must be an integer, not float
+    """
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise TypeError(f"{name} must be an integer, not {type(value).__name__}")
     if value < 1:
@@ -248,8 +280,43 @@ def checked_policy(name: str, policy: ArrayLike, mdp: MDP) -> NDArray[np.integer
     return actions
 
 
+def checked_values(V: ArrayLike, mdp: MDP) -> NDArray[np.float64]:
+    """Return `V` as an array of its own; raise unless it has one finite number for every state.
+
+    Raises
+    ------
+    TypeError, ValueError
+        `V` is not made of numbers; it has another shape, or an entry is not finite.
+
+    Examples
+    --------
+    >>> lake = MDP.from_env("FrozenLake-v1")
+    >>> checked_values([0.0, 1.0], lake)
+    Traceback (most recent call last):
+    ValueError: V must have shape (16,), not (2,)
+    """
+    values = _as_floats("V", V)
+    if values.shape != (mdp.n_states,):
+        raise ValueError(f"V must have shape ({mdp.n_states},), not {values.shape}")
+    wrong = np.flatnonzero(~np.isfinite(values))
+    if len(wrong):
+        raise ValueError(f"V must be finite, in state {wrong[0]} it is {values[wrong[0]]}")
+    return values
+
+
+def _as_floats(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Return a copy as float64; numpy's own messages do not say which argument they are about."""
+    try:
+        given = np.asarray(values)
+    except ValueError as error:  # ragged nesting
+        raise ValueError(f"{name} must be an array of numbers, it is {values!r}") from error
+    if given.dtype.kind not in "iuf":
+        raise TypeError(f"{name} must hold numbers, not {given.dtype}")
+    return given.astype(np.float64)
+
+
 def _checked_table(Q: ArrayLike) -> NDArray[np.float64]:
-    table = np.array(Q, dtype=np.float64)
+    table = _as_floats("Q", Q)
     if table.ndim != 2 or 0 in table.shape:
         raise ValueError(f"Q must have shape (states, actions), not {table.shape}")
     if not np.isfinite(table).all():

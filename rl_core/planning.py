@@ -297,7 +297,8 @@ def policy_iteration(
     -----
     A linear solve is not made of backups: with exact evaluation `backups` counts the improvements
     only. To compare the whole cost with `q_value_iteration`, give an `evaluation_threshold`:
-    then it is S backups an evaluation sweep (one action a state) and S A an improvement.
+    then it is S backups an evaluation sweep (one action a state) and S A an improvement. Finding
+    the default `initial_policy` looks one step ahead everywhere: S A more, in the first round.
 
     Examples
     --------
@@ -311,10 +312,11 @@ def policy_iteration(
         check_positive("evaluation_threshold", evaluation_threshold)
     transitions, reward = sweeps.arrays(mdp)
     Q, V, policy = plan.blank(mdp)
+    first = 0  # backups before the first round
     if initial_policy is None:
         sweeps.lookahead(transitions, reward, gamma, V, Q)
         sweeps.greedy(Q, V, policy)
-        Q[:], V[:] = 0, 0
+        Q[:], V[:], first = 0, 0, Q.size
     else:
         policy[:] = plan.checked_policy("initial_policy", initial_policy, mdp)
     states, largest = np.arange(mdp.n_states), float(np.abs(reward).max())
@@ -334,8 +336,9 @@ def policy_iteration(
             policy = np.where(better, greedy_policy(Q), policy)
             changes = int(better.sum())
             bound = plan.error_bound(float(np.abs(best - V).max()), gamma, rounding)
-            backups = Q.size + evaluations * mdp.n_states
+            backups = first + Q.size + evaluations * mdp.n_states
             record.add(residual, math.sqrt(squares), changes, backups, bound, evaluations)
+            first = 0
     sweeps.greedy(Q, V, policy)
     return Plan(Q, V, policy, record.table())
 
@@ -411,7 +414,7 @@ def backup(mdp: MDP, V: ArrayLike, *, gamma: float) -> NDArray[np.float64]:
     Raises
     ------
     ValueError, TypeError
-        If an argument is out of range or has the wrong shape or type.
+        If an argument is out of range, not finite, or has the wrong shape or type.
 
     Examples
     --------
@@ -420,9 +423,7 @@ def backup(mdp: MDP, V: ArrayLike, *, gamma: float) -> NDArray[np.float64]:
     [0.0, 0.333, 0.333, 0.333]
     """
     check_model(mdp, gamma)
-    values = np.array(V, dtype=np.float64)
-    if values.shape != (mdp.n_states,):
-        raise ValueError(f"V must have shape ({mdp.n_states},), not {values.shape}")
+    values = plan.checked_values(V, mdp)
     transitions, reward = sweeps.arrays(mdp)
     Q = np.zeros((mdp.n_states, mdp.n_actions))
     sweeps.lookahead(transitions, reward, gamma, values, Q)

@@ -330,17 +330,20 @@ def test_table_of_policy_iteration():
     assert exact["policy_changes"].tolist() == swept["policy_changes"].tolist()
     assert exact["policy_changes"].iloc[-1] == 0
     assert (exact["policy_changes"].iloc[:-1] > 0).all()
-    assert exact["backups"].tolist() == [448 * sweep for sweep in exact["sweep"]]
+    # One look ahead a round, and one before the first, for the policy to begin with.
+    assert exact["backups"].tolist() == [448 * (sweep + 1) for sweep in exact["sweep"]]
     assert (exact["evaluation_sweeps"] == 0).all()
     cost = 448 + 112 * swept["evaluation_sweeps"]
-    assert swept["backups"].tolist() == cost.cumsum().tolist()
+    assert swept["backups"].tolist() == (448 + cost.cumsum()).tolist()
     assert exact["bound"].iloc[-1] < 1e-10
 
 
 def test_policy_iteration_from_the_optimum_takes_one_round():
     mdp = MDP.from_env("Taxi-v4")
     policy = value_iteration(mdp, gamma=0.9, tolerance=1e-9).policy
-    assert len(policy_iteration(mdp, gamma=0.9, initial_policy=policy).table) == 1
+    table = policy_iteration(mdp, gamma=0.9, initial_policy=policy).table
+    assert len(table) == 1
+    assert table["backups"].tolist() == [mdp.n_states * mdp.n_actions]  # no policy to be found
 
 
 def test_policy_iteration_improves_every_round():
@@ -537,6 +540,13 @@ def test_gamma_out_of_range(planner, gamma):
         (lambda m: policy_evaluation(m, np.full(112, -1), gamma=0.9), ValueError, "it is -1"),
         (lambda m: policy_evaluation(m, np.zeros(112), gamma=0.9), TypeError, "policy must hold"),
         (lambda m: backup(m, np.zeros(3), gamma=0.9), ValueError, r"V must have shape \(112,\)"),
+        (
+            lambda m: backup(m, np.where(np.arange(112) == 1, np.nan, 0.0), gamma=0.9),
+            ValueError,
+            "V must be finite, in state 1 it is nan",
+        ),
+        (lambda m: backup(m, ["a"] * 112, gamma=0.9), TypeError, "V must hold numbers"),
+        (lambda m: backup(m, [[1.0], []], gamma=0.9), ValueError, "V must be an array of numbers"),
         (lambda m: greedy_policy([1.0, 2.0]), ValueError, "Q must have shape"),
         (lambda m: greedy_policy([[1.0], [np.nan]]), ValueError, "Q must be finite, in state 1"),
         (lambda m: optimal_actions([[1.0]], tolerance=-1), ValueError, "tolerance must be pos"),
