@@ -7,7 +7,7 @@ is a Gymnasium environment, `Maze.model` its exact model; `random_maze` draws ma
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any
 
 import gymnasium as gym
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from rl_core.compiled import compiled
 from rl_core.maze_layout import COURSE_LAYOUT, MAX_FLAGS, find, random_layout, read_layout
 from rl_core.maze_picture import draw_maze
-from rl_core.mdp import MDP
+from rl_core.mdp import MDP, OwnModel
 
 __all__ = ["ACTIONS", "CLOCKWISE", "COURSE_LAYOUT", "MAX_FLAGS", "MOVES", "Maze", "random_maze"]
 
@@ -31,7 +31,7 @@ CLOCKWISE = (3, 2, 0, 1)
 """The action a quarter turn clockwise of each action: up → right → down → left → up."""
 
 
-class Maze(gym.Env[int, int]):
+class Maze(OwnModel, gym.Env[int, int]):
     """A grid maze with flags to collect on the way to the goal.
 
     **States.** A state is a cell and the set of flags held, numbered `2**n * cell + flag_set` for n
@@ -166,8 +166,14 @@ class Maze(gym.Env[int, int]):
             If `action` is not one of 0, 1, 2, 3.
         gymnasium.error.ResetNeeded
             If no episode has begun.
+
+        Examples
+        --------
+        >>> env = Maze("SFG", slip=0)
+        >>> env.reset()[0], env.step(3)[:3], env.step(3)[:3]  # right, and right again
+        (0, (3, 0.0, False), (5, 1.0, True))
         """
-        if not self.action_space.contains(action):
+        if isinstance(action, bool) or not self.action_space.contains(action):
             raise ValueError(f"action must be 0, 1, 2 or 3, not {action!r}")
         if self._state is None:
             raise ResetNeeded("call reset() before step()")
@@ -259,7 +265,9 @@ class Maze(gym.Env[int, int]):
         111
         """
         n_rows, n_columns = self.walls.shape
-        if not (0 <= row < n_rows and 0 <= column < n_columns) or self.walls[row, column]:
+        whole = _is_whole(row) and _is_whole(column)
+        inside = whole and 0 <= row < n_rows and 0 <= column < n_columns
+        if not inside or self.walls[row, column]:
             raise ValueError(f"row {row}, column {column} is not a free cell of the maze")
         mask = 0
         for flag in flags:
@@ -276,10 +284,15 @@ class Maze(gym.Env[int, int]):
         ------
         ValueError
             If there is no such state.
+
+        Examples
+        --------
+        >>> Maze().locate(111)
+        (1, 4, 'ABC')
         """
-        if not 0 <= state < len(self.cells) * len(self._masks):
+        if not _is_whole(state) or not 0 <= state < len(self.cells) * len(self._masks):
             limit = len(self.cells) * len(self._masks) - 1
-            raise ValueError(f"state must lie in 0..{limit}, it is {state}")
+            raise ValueError(f"state must be an integer in 0..{limit}, it is {state!r}")
         cell, flag_set = divmod(int(state), len(self._masks))
         row, column = self.cells[cell].tolist()
         return row, column, self._flags_held(flag_set)
@@ -289,6 +302,20 @@ class Maze(gym.Env[int, int]):
 
         The text is the layout with the agent as `@` and flags held as `f`, and a line naming them.
         The picture is that of `rl_core.maze_picture.draw_maze`.
+
+        Raises
+        ------
+        gymnasium.error.ResetNeeded
+            If no episode has begun.
+
+        Examples
+        --------
+        >>> env = Maze("SFG", render_mode="ansi")
+        >>> env.reset()[0]
+        0
+        >>> print(env.render(), end="")
+        @ F G
+        flags held: none
         """
         if self.render_mode is None:
             gym.logger.warn("render() needs a render_mode: gymnasium.make(id, render_mode=...)")
@@ -375,9 +402,30 @@ def random_maze(
 ) -> Maze:
     """Draw a random maze whose goal and flags can all be reached from the start.
 
-    See `rl_core.maze_layout.random_layout` for how it is drawn, for the parameters (`slip` is the
-    maze's own) and for what is raised. Exactly `round(wall_fraction * rows * columns)` cells are
-    walls, and the same state of `rng` gives the same maze.
+    See `rl_core.maze_layout.random_layout` for how it is drawn.
+
+    Parameters
+    ----------
+    rows, columns : int
+        Size of the grid.
+    flags : int
+        How many flags there are, at most 16.
+    wall_fraction : float
+        Exactly `round(wall_fraction * rows * columns)` cells are walls.
+    rng : numpy.random.Generator
+        The same state of it gives the same maze.
+    slip : float
+        Probability of slipping, in [0, 1].
+
+    Returns
+    -------
+    Maze
+        The maze, not yet reset.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As `random_layout` and `Maze` raise them.
 
     Examples
     --------
@@ -388,8 +436,13 @@ def random_maze(
     return Maze(_joined(random_layout(rows, columns, flags, wall_fraction, rng)), slip=slip)
 
 
+def _is_whole(number: object) -> bool:
+    """Say whether it is an integer and no bool, which Python would take for one."""
+    return isinstance(number, Integral) and not isinstance(number, bool)
+
+
 def _checked_slip(slip: object) -> float:
-    if not isinstance(slip, Real):
+    if isinstance(slip, bool) or not isinstance(slip, Real):
         raise TypeError(f"slip must be a number, not {type(slip).__name__}")
     value = float(slip)
     if not 0 <= value <= 1:

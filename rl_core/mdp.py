@@ -14,10 +14,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rl_core.compiled import compiled
-from rl_core.toy_text import check_distribution, read_table, start_arrays
+from rl_core.toy_text import SUM_TOLERANCE, check_distribution, read_table, start_arrays
 
-SUM_TOLERANCE = 1e-9
-"""How far probabilities may add up to from 1."""
+
+class OwnModel:
+    """A base for environments that make their own model, as the Maze does.
+
+    An environment is asked for its model only if it derives from this class: `model` is a common
+    word, and what another environment calls so may be anything.
+    """
+
+    def model(self) -> MDP:
+        """Return the exact model of the environment."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +155,7 @@ class MDP:
 
         The table is `P[s][a] = [(probability, next state, reward, terminated), ...]`, as in
         FrozenLake, CliffWalking and Taxi. The slots keep the order of these rows. An environment
-        that makes its own model, as the Maze does, is asked for it.
+        that makes its own model (`OwnModel`), as the Maze does, is asked for it.
 
         Gymnasium marks the end of an episode on the transition, an `MDP` on the state entered. A
         state becomes terminal if every transition into it from another state is terminated (and
@@ -163,13 +172,19 @@ class MDP:
             The probability that an episode starts in each state. By default the environment's
             `initial_state_distrib`, or all on its `start_state_index`.
 
+        Returns
+        -------
+        MDP
+            The model; its first S states are the environment's.
+
         Raises
         ------
         TypeError
             If `env` is neither an id nor an environment.
         ValueError
-            If the environment has no table, the table lacks a state or an action, the start
-            distribution is missing or of the wrong shape, or the model's own checks fail.
+            If Gymnasium does not know the id, the environment has no table, the table is malformed
+            (then the message names the state, the action and what is there), the start distribution
+            is missing, no numbers or of the wrong shape, or the model's own checks fail.
 
         Examples
         --------
@@ -178,14 +193,20 @@ class MDP:
         ((16, 4, 3), [5, 7, 11, 12, 15])
         """
         if isinstance(env, str):
-            with gym.make(env) as made:
+            try:
+                made = gym.make(env)
+            except gym.error.Error as error:
+                raise ValueError(
+                    f"env is {env!r}; allowed are ids that Gymnasium knows ({error})"
+                ) from error
+            with made:
                 return cls.from_env(made, start_distribution)
         if not isinstance(env, gym.Env):
             raise TypeError(f"env must be an id or a gymnasium.Env, not {type(env).__name__}")
-        own_model = getattr(env.unwrapped, "model", None)
-        model = own_model() if callable(own_model) else None
-        if not isinstance(model, cls):
-            return cls(**read_table(env.unwrapped, start_distribution))
+        base = env.unwrapped
+        if not isinstance(base, OwnModel):
+            return cls(**read_table(base, start_distribution))
+        model = base.model()
         if start_distribution is None:
             return model
         start = check_distribution(start_distribution, model.n_states)
@@ -265,7 +286,7 @@ def _as_array(name: str, values: ArrayLike, dtype: type[np.generic], ndim: int) 
     if given.ndim != ndim:
         raise ValueError(f"{name} must have {ndim} axes, its shape is {given.shape}")
     kinds = {np.int32: "iu", np.float64: "iuf", np.bool_: "b"}[dtype]
-    if given.dtype.kind not in kinds:
+    if given.size and given.dtype.kind not in kinds:  # an empty list has no type of its own
         raise ValueError(f"{name} must be of type {dtype.__name__}, not {given.dtype}")
     array = given.astype(dtype, copy=False)
     if dtype is np.int32 and array is not given and not np.array_equal(array, given):

@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm
 
 from rl_core import sweeps
-from rl_core.mdp import MDP, SUM_TOLERANCE
+from rl_core.mdp import MDP
+from rl_core.toy_text import SUM_TOLERANCE
 
 PATIENCE = 2.0
 """Seconds before progress is shown."""

@@ -110,7 +110,7 @@ def played(env: Environment) -> Played:
     TypeError
         `env` is neither an environment nor an id nor a function that makes one.
     ValueError
-        A space is not Discrete.
+        Gymnasium does not know the id, or a space is not Discrete.
 
     Examples
     --------
@@ -118,7 +118,16 @@ def played(env: Environment) -> Played:
     Traceback (most recent call last):
     ValueError: env has the observation space Box([-1.2  -0.07], [0.6  0.07], (2,), float32); ...
     """
-    made = gym.make(env) if isinstance(env, str) else env() if callable(env) else env
+    made: object
+    if isinstance(env, str):
+        try:
+            made = gym.make(env)
+        except gym.error.Error as error:
+            raise ValueError(
+                f"env is {env!r}; allowed are ids that Gymnasium knows ({error})"
+            ) from error
+    else:
+        made = env() if callable(env) else env
     if not isinstance(made, gym.Env):
         raise TypeError(
             f"env is {env!r}; allowed is an MDP, a gymnasium.Env, an id, or a function making one"

@@ -6,11 +6,15 @@ episode on the transition; the arrays made here mark it on the state entered.
 
 from __future__ import annotations
 
+from numbers import Integral, Real
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+SUM_TOLERANCE = 1e-9
+"""How far probabilities may add up to from 1."""
 
 Transition = tuple[float, int, float, bool]
 """Probability, next state, reward, terminated."""
@@ -40,7 +44,15 @@ def check_distribution(start_distribution: ArrayLike, n_states: int) -> NDArray[
     >>> check_distribution([1, 0], n_states=2)
     array([1., 0.])
     """
-    distribution = np.asarray(start_distribution, dtype=np.float64)
+    try:
+        given = np.asarray(start_distribution)
+        distribution = given.astype(np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(
+            f"start_distribution is {start_distribution!r}; allowed is a number a state"
+        ) from error
+    if given.dtype.kind not in "iufb":
+        raise ValueError(f"start_distribution must hold numbers, not {given.dtype}")
     if distribution.shape != (n_states,):
         raise ValueError(
             f"start_distribution must have shape ({n_states},), not {distribution.shape}"
@@ -70,30 +82,65 @@ def _table(env: gym.Env[Any, Any]) -> list[list[list[Transition]]]:
     if table is None:
         raise ValueError(f"env must have a transition table P, {name} has none")
     malformed = f"env: the table P of {name} is malformed:"
-    if len(table) == 0:
+    rows = _rows(table, malformed)
+    for s, actions in enumerate(rows):
+        for a, row in enumerate(actions):
+            for transition in row:
+                if not _is_transition(transition, len(rows)):
+                    raise ValueError(
+                        f"{malformed} a transition must be (probability, next state, reward, "
+                        f"terminated), at state {s}, action {a} there is {transition!r}"
+                    )
+            total = sum(transition[0] for transition in row)
+            if abs(total - 1) > SUM_TOLERANCE:
+                raise ValueError(
+                    f"{malformed} probability must sum to 1, at state {s}, action {a} the sum is "
+                    f"{total}"
+                )
+    return rows
+
+
+def _rows(table: Any, malformed: str) -> list[list[list[Any]]]:
+    """Return a table, whatever it is made of, as lists: states, actions and what they hold."""
+    rows: list[list[list[Any]]] = []
+    try:
+        n_states = len(table)
+        for s in range(n_states):
+            rows.append([list(table[s][a]) for a in range(len(table[s]))])
+    except (KeyError, IndexError):
+        raise ValueError(
+            f"{malformed} states and actions must be numbered from 0, not so at state {len(rows)}"
+        ) from None
+    except TypeError:
+        raise ValueError(
+            f"{malformed} it must hold, for each state and action, a list of transitions, "
+            f"not so at state {len(rows)}"
+        ) from None
+    if not rows:
         raise ValueError(f"{malformed} it is empty")
-    rows: list[list[list[Transition]]] = []
-    for s in range(len(table)):
-        try:
-            actions = [list(table[s][a]) for a in range(len(table[s]))]
-        except (KeyError, IndexError):
-            raise ValueError(
-                f"{malformed} states and actions must be numbered from 0, not so at state {s}"
-            ) from None
-        rows.append(actions)
+    for s, actions in enumerate(rows):
         if len(actions) != len(rows[0]) or not actions:
             raise ValueError(
                 f"{malformed} every state must have the same actions, at least one; "
                 f"state {s} has {len(actions)}, state 0 has {len(rows[0])}"
             )
-        for a, row in enumerate(actions):
-            for transition in row:
-                if len(transition) != 4 or not 0 <= transition[1] < len(table):
-                    raise ValueError(
-                        f"{malformed} a transition must be (probability, next state, reward, "
-                        f"terminated), at state {s}, action {a} there is {transition}"
-                    )
     return rows
+
+
+def _is_transition(transition: object, n_states: int) -> bool:
+    """Say whether it is (probability, next state, reward, terminated), with values that can be."""
+    if not isinstance(transition, tuple | list) or len(transition) != 4:
+        return False
+    probability, following, reward, terminated = transition
+    return (
+        isinstance(probability, Real)
+        and 0 <= float(probability) <= 1
+        and not isinstance(following, bool)
+        and isinstance(following, Integral)
+        and 0 <= int(following) < n_states
+        and isinstance(reward, Real)
+        and isinstance(terminated, bool | np.bool_ | Integral)
+    )
 
 
 def _start_distribution(

@@ -337,6 +337,8 @@ def test_slip_outside_its_range(slip: float) -> None:
 def test_arguments_of_the_wrong_type() -> None:
     with pytest.raises(TypeError, match="slip must be a number, not str"):
         Maze(slip="0.1")  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="slip must be a number, not bool"):
+        Maze(slip=True)
     with pytest.raises(TypeError, match="layout must be a text"):
         Maze([1, 2])  # type: ignore[list-item]
     with pytest.raises(TypeError, match="layout must be a text"):
@@ -356,14 +358,17 @@ def test_too_many_states() -> None:
 
 def test_places_and_states_that_do_not_exist() -> None:
     maze = Maze()
-    for row, column in ((0, 1), (-1, 0), (4, 0), (0, 5)):
+    for row, column in ((0, 1), (-1, 0), (4, 0), (0, 5), (0.5, 0), (0, "1"), (True, 0)):
         with pytest.raises(ValueError, match=f"row {row}, column {column} is not a free cell"):
             maze.state(row, column)
     with pytest.raises(ValueError, match=r"flags.*'D'"):
         maze.state(0, 0, "AD")
-    for state in (-1, 112):
-        with pytest.raises(ValueError, match=f"state must lie in 0..111, it is {state}"):
-            maze.locate(state)
+    for state in (-1, 112, 1.5, True, "1"):
+        with pytest.raises(
+            ValueError, match=f"state must be an integer in 0..111, it is {state!r}"
+        ):
+            maze.locate(state)  # type: ignore[arg-type]
+    assert maze.locate(np.int16(111)) == (1, 4, "ABC")  # type: ignore[arg-type]
 
 
 # Episodes
@@ -452,7 +457,7 @@ def test_misuse_is_named() -> None:
     with pytest.raises(gym.error.ResetNeeded):
         maze.render()
     maze.reset()
-    for action in (4, -1, 0.5, "up", None):
+    for action in (4, -1, 0.5, True, "up", None):
         with pytest.raises(ValueError, match=f"action must be 0, 1, 2 or 3, not {action!r}"):
             maze.step(action)  # type: ignore[arg-type]
 

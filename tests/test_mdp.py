@@ -111,7 +111,7 @@ def changed(name: str, index: Any, value: Any) -> dict[str, Any]:
         ({"start_state": [-1]}, r"start_state.*entry 0 is -1"),
         ({"start_probability": [0.5]}, r"start_probability must sum to 1.*0\.5"),
         ({"start_probability": [1.5]}, r"start_probability.*entry 0 is 1\.5"),
-        ({"start_state": [], "start_probability": []}, r"start_state"),
+        ({"start_state": [], "start_probability": []}, r"start_state.*at least 1, not 0 and 0"),
         ({"start_state": [0, 0]}, r"start_state and start_probability.*2 and 1"),
         ({"terminal": [False]}, r"terminal.*\(2,\).*\(1,\)"),
         ({"terminal": [0, 1]}, r"terminal.*bool.*int64"),

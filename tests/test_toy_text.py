@@ -190,6 +190,10 @@ def test_the_start_may_be_given() -> None:
     assert len(uniform.start_state) == 112
     with pytest.raises(ValueError, match=r"start_distribution.*\(2,\).*\(3,\)"):
         MDP.from_env(Table(rows), start_distribution=[1.0, 0.0, 0.0])
+    with pytest.raises(ValueError, match=r"start_distribution must hold numbers|is \['a', 'b'\]"):
+        MDP.from_env(Table(rows), start_distribution=["a", "b"])
+    with pytest.raises(ValueError, match="start_distribution must hold numbers, not <U3"):
+        MDP.from_env(Table(rows), start_distribution=["1.0", "0.0"])
     with pytest.raises(ValueError, match="start_probability must sum to 1"):
         MDP.from_env(Table(rows), start_distribution=[0.5, 0.0])
     with pytest.raises(ValueError, match=r"start_probability.*-1"):
@@ -208,6 +212,20 @@ def test_the_start_may_be_given() -> None:
         ([[[(1.0, 1, 0.0, False)]]], r"P of Table.*state 0, action 0 there is \(1.0, 1, 0.0"),
         ([[[(1.0, -1, 0.0, False)]]], r"P of Table.*state 0, action 0 there is \(1.0, -1"),
         ([[[(1.0, 0)]]], r"P of Table.*state 0, action 0 there is \(1.0, 0\)"),
+        ([[[(1.0, 1.5, 0.0, False)]] * 2], "P of Table.*state 0, action 0 there is .1.0, 1.5"),
+        ([[[(1.0, True, 0.0, False)]]] * 2, "P of Table.*state 0, action 0 there is .1.0, True"),
+        ([[[(1.0, 0, 0.0, False)], [7]]], "P of Table.*state 0, action 1 there is 7"),
+        ([[["rain"]]], "P of Table.*state 0, action 0 there is 'rain'"),
+        ([[[("1", 0, 0.0, False)]]], "P of Table.*there is .'1', 0"),
+        ([[[(1.5, 0, 0.0, False)]]], "P of Table.*there is .1.5, 0"),
+        ([[[(np.nan, 0, 0.0, False)]]], "P of Table.*there is .nan, 0"),
+        ([[[(1.0, 0, None, False)]]], "P of Table.*there is .1.0, 0, None"),
+        ([[[(1.0, 0, 0.0, "no")]]], "P of Table.*there is .*'no'"),
+        ([[3]], "P of Table.*list of transitions, not so at state 0"),
+        (
+            {0: {0: [(0.5, 0, 0.0, False)], 1: [(1.0, 0, 0.0, False)]}},
+            "P of Table.*probability must sum to 1, at state 0, action 0 the sum is 0.5",
+        ),
         ([[[(0.5, 0, 1.0, False)]]], "probability must sum to 1.*state 0, action 0"),
         ([[[(1.0, 0, np.inf, False)]]], "reward must be finite.*state 0, action 0"),
     ],
@@ -217,7 +235,18 @@ def test_malformed_tables_are_named(rows: Any, message: str) -> None:
         MDP.from_env(Table(rows))
 
 
+def test_only_an_environment_that_says_so_is_asked_for_its_model() -> None:
+    class World(Table):
+        def model(self, x: float) -> float:
+            return x
+
+    rows = [[[(1.0, 1, 1.0, True)]], [[(1.0, 1, 0.0, True)]]]
+    assert MDP.from_env(World(rows)).n_states == 2
+
+
 def test_environments_without_a_table_are_refused() -> None:
+    with pytest.raises(ValueError, match="env is 'Labyrinth-v0'; allowed are ids that Gymnasium"):
+        MDP.from_env("Labyrinth-v0")
     with pytest.raises(ValueError, match=r"CartPole.* has none"):
         MDP.from_env("CartPole-v1")
     with pytest.raises(TypeError, match=r"env must be .* gymnasium\.Env, not dict"):
