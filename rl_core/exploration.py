@@ -263,6 +263,11 @@ class Evaluation:
     ------
     TypeError, ValueError
         An attribute is not as described.
+
+    Examples
+    --------
+    >>> Evaluation(every=100, epsilon=0)
+    Evaluation(every=100, episodes=10, max_steps=100, epsilon=0)
     """
 
     every: int = 50
@@ -366,6 +371,16 @@ def choose(kind: int, parameter: float, q: NDArray[np.float64], u: float, v: flo
         The action values of the state.
     u, v : float
         Two uniforms in [0, 1); see the rules for what each decides.
+
+    Returns
+    -------
+    int
+        The action, from 0 to A - 1.
+
+    Examples
+    --------
+    >>> choose(EPSILON_GREEDY, 0.1, np.array([0.0, 2.0, 1.0]), u=0.5, v=0.9)
+    1
     """
     if kind == SOFTMAX:
         return _softmax_action(q, parameter, u)

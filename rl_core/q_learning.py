@@ -19,7 +19,7 @@ Gymnasium environment it runs as it stands. Both agree bit for bit where both pl
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -50,13 +50,16 @@ from rl_core.planning import value_iteration
 from rl_core.run import Failure, Run
 from rl_core.tabular import Environment, Played, Streams, World, start, step
 from rl_core.tabular_record import (
+    Appraisal,
     Yardstick,
     as_table,
     empty_record,
     env_steps,
     make_yardstick,
+    new_appraisal,
     write_episode,
     write_evaluation,
+    write_loss,
 )
 
 NO_LIMIT = 2**62
@@ -155,12 +158,13 @@ def q_learning(
         - `error_norm`: the Frobenius norm of Q - Q*; `rmse`: that divided by sqrt(S A), the root
           of the mean squared error over all entries; `rmse_visitable`: the same over the
           entries of visitable states, those that are not terminal and can be reached;
-        - `optimal_states`: visitable states in which every greedy action is optimal.
+        - `optimal_states`: visitable states in which every greedy action is optimal;
+        - `value_lost`: v*(s_0) - v_pi(s_0) for the greedy policy pi (ties drawn uniformly) and the
+          start state s_0 (the average over several), both exact from the model, discounted. With
+          gamma = 1 it can take very many sweeps, so it is then found with the evaluations only.
 
         After every `config.evaluation.every` episodes, NaN in between:
 
-        - `value_lost`: v*(s_0) - v_pi(s_0) for the greedy policy pi (ties drawn uniformly) and the
-          start state s_0 (the average over several), both exact from the model, discounted;
         - `eval_return` (undiscounted), `eval_steps`: means over the evaluation's episodes.
 
         Arrays: `Q` (seeds, S, A) float64, `visits` (seeds, S, A) int64, and with snapshots
@@ -186,7 +190,7 @@ def q_learning(
     >>> run.arrays["Q"].shape, len(run.table)
     ((2, 112, 4), 200)
     """
-    _check_arguments(config, episodes, seeds, snapshots)
+    seeds, snapshots = _check_arguments(config, episodes, seeds, snapshots)
     world, model, shape = tabular.opened(env)
     try:
         yardstick = make_yardstick(model, Q_star, shape)
@@ -239,7 +243,7 @@ def q_learning_on_model(
     """
     if not isinstance(env, str):
         raise TypeError(f"env is {env!r}; allowed is an environment's id")
-    _check_arguments(config, episodes, seeds, snapshots)
+    seeds, snapshots = _check_arguments(config, episodes, seeds, snapshots)
     model = MDP.from_env(env)
     limit = gym.spec(env).max_episode_steps
     if limit is not None:
@@ -298,6 +302,7 @@ def _learn(
     world: World,
     task: _Task,
     yardstick: Yardstick,
+    appraisal: Appraisal,
     streams: Streams,
     trial_streams: Streams,
     Q: Values,
@@ -315,11 +320,14 @@ def _learn(
         write_episode(record, k, outcome, Q, yardstick)
         if not np.isfinite(outcome[1]):
             return k
-        if (k + 1) % task.trial_every == 0:
+        on_trial = (k + 1) % task.trial_every == 0
+        if on_trial or task.gamma < 1.0:
+            write_loss(record, k, Q, yardstick, task.gamma, appraisal)
+        if on_trial:
             trials = np.empty((task.trial_episodes, 2))
             for i in range(task.trial_episodes):
                 trials[i] = _try_episode(world, task, trial_streams, Q)
-            write_evaluation(record, k, trials, Q, yardstick, task.gamma)
+            write_evaluation(record, k, trials)
     return last
 
 
@@ -404,13 +412,13 @@ def _train(
     record = empty_record(len(seeds), episodes)
     failures = []
     for i, seed in enumerate(seeds):
-        streams = tabular.spawn_streams(seed, 2)
+        streams, appraisal = tabular.spawn_streams(seed, 2), new_appraisal(learner.yardstick)
         if isinstance(learner.world, Played):
             learner.world.env.reset(seed=int(seed))  # for what else the environment draws from
         Q, visits, first = arrays["Q"][i], arrays["visits"][i], 0
         for last in sorted({*snapshots, episodes}):
             stopped = learner.learn(
-                *(learner.world, task, learner.yardstick, *streams),
+                *(learner.world, task, learner.yardstick, appraisal, *streams),
                 *(Q, visits, record[i], first, last),
             )
             if stopped < last:
@@ -427,16 +435,26 @@ def _train(
 
 def _check_arguments(
     config: object, episodes: int, seeds: Sequence[int], snapshots: Sequence[int]
-) -> None:
-    """Raise on whatever does not depend on the environment."""
+) -> tuple[list[int], list[int]]:
+    """Raise on whatever does not depend on the environment; return seeds and snapshots as lists."""
     if not isinstance(config, QLearningConfig):
         raise TypeError(f"config is {config!r}; allowed is a QLearningConfig")
     check_integer("episodes", episodes, least=1)
-    if not seeds or len(set(seeds)) < len(seeds):
-        raise ValueError(f"seeds is {seeds}; allowed is at least one, each once")
-    for seed in seeds:
-        check_integer("seeds", seed, least=0)
-    for episode in snapshots:
-        check_integer("snapshots", episode, least=0)
+    numbers = _integers("seeds", seeds)
+    if not numbers or len(set(numbers)) < len(numbers):
+        raise ValueError(f"seeds is {numbers}; allowed is at least one, each once")
+    at = _integers("snapshots", snapshots)
+    for episode in at:
         if episode > episodes:
             raise ValueError(f"snapshots has {episode}; allowed are 0 to {episodes}")
+    return numbers, at
+
+
+def _integers(name: str, values: object) -> list[int]:
+    """Return a sequence of integers from 0, an array or not, as a list of Python's own."""
+    if not isinstance(values, Iterable) or isinstance(values, str):
+        raise TypeError(f"{name} is {values!r}; allowed is a sequence of integers from 0")
+    found = list(values)
+    for value in found:
+        check_integer(name, value, least=0)
+    return [int(value) for value in found]

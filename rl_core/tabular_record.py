@@ -16,9 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from rl_core.compiled import compiled
 from rl_core.mdp import MDP
+from rl_core.plan import optimal_actions
 
-TIE = 1e-8
-"""Actions whose Q* differ by less are equally good."""
 TOLERANCE = 1e-12
 """How far values may still move in a sweep when a policy counts as evaluated."""
 MAX_SWEEPS = 100_000
@@ -66,6 +65,53 @@ class Yardstick(NamedTuple):
     terminal: NDArray[np.bool_]
     start_state: NDArray[np.int32]
     start_probability: NDArray[np.float64]
+
+
+class Appraisal(NamedTuple):
+    """What is known of the greedy policy since it was last valued; changed by `value_lost`.
+
+    Most episodes leave the policy as it was wherever it leads, and then its value is known. If it
+    changed, the values of before are a good place to start from.
+
+    Attributes
+    ----------
+    greedy : ndarray of bool, shape (S, A)
+        The greedy actions, in the states that the policy can get to.
+    order : ndarray of int32, shape (S,)
+        These states, as a search from the start finds them.
+    found : ndarray of int64, shape (1,)
+        How many they are; -1 while nothing is known.
+    V : ndarray of float64, shape (S,)
+        Their values; of others, those they had when the policy last got there.
+    lost : ndarray of float64, shape (1,)
+        The value lost.
+    """
+
+    greedy: NDArray[np.bool_]
+    order: NDArray[np.int32]
+    found: NDArray[np.int64]
+    V: NDArray[np.float64]
+    lost: NDArray[np.float64]
+
+
+def new_appraisal(yardstick: Yardstick) -> Appraisal:
+    """Return an appraisal that knows nothing yet.
+
+    Examples
+    --------
+    >>> from rl_core.maze import Maze
+    >>> yardstick = make_yardstick(Maze().model(), np.zeros((112, 4)), (112, 4))
+    >>> new_appraisal(yardstick).found
+    array([-1])
+    """
+    n_states, n_actions = yardstick.successor.shape[:2]
+    return Appraisal(
+        np.zeros((n_states, n_actions), dtype=np.bool_),
+        np.zeros(n_states, dtype=np.int32),
+        np.full(1, -1, dtype=np.int64),
+        np.zeros(n_states),
+        np.full(1, np.nan),
+    )
 
 
 class Errors(NamedTuple):
@@ -116,7 +162,7 @@ def make_yardstick(
     np.int64(92)
     """
     best = _checked_Q_star(Q_star, shape)
-    optimal = best >= best.max(axis=1, keepdims=True, initial=-np.inf) - TIE
+    optimal = optimal_actions(best) if len(best) else best.astype(np.bool_)
     if model is None:
         nowhere = np.empty((0, 0, 0))
         return Yardstick(
@@ -138,7 +184,12 @@ def make_yardstick(
 def _checked_Q_star(Q_star: ArrayLike | None, shape: tuple[int, int]) -> NDArray[np.float64]:
     if Q_star is None:
         return np.empty((0, shape[1]))
-    array = np.asarray(Q_star)
+    try:
+        array = np.asarray(Q_star)
+    except ValueError as error:  # ragged nesting
+        raise ValueError(
+            f"Q_star is {Q_star!r}; allowed is an array of shape {shape}, states by actions"
+        ) from error
     if array.dtype.kind not in "iuf":
         raise TypeError(f"Q_star has dtype {array.dtype}; allowed are numbers")
     if array.shape != shape:
@@ -205,26 +256,39 @@ def write_episode(
 
 
 @compiled
-def write_evaluation(
+def write_loss(
     record: NDArray[np.float64],
     k: int,
-    trials: NDArray[np.float64],
     Q: NDArray[np.float64],
     yardstick: Yardstick,
     gamma: float,
+    appraisal: Appraisal,
 ) -> None:
-    """Add to the row of episode k the value lost and the evaluation's mean return and steps.
+    """Add to the row of episode k the value that the greedy policy loses."""
+    record[k, _VALUE_LOST] = value_lost(Q, yardstick, gamma, appraisal)
+
+
+@compiled
+def write_evaluation(record: NDArray[np.float64], k: int, trials: NDArray[np.float64]) -> None:
+    """Add to the row of episode k the evaluation's mean return and steps.
 
     `trials` has a row (return, steps) for each of the evaluation's episodes.
     """
-    record[k, _VALUE_LOST] = value_lost(Q, yardstick, gamma)
     record[k, _EVAL_RETURN] = np.mean(trials[:, 0])
     record[k, _EVAL_STEPS] = np.mean(trials[:, 1])
 
 
 @compiled
 def errors(Q: NDArray[np.float64], yardstick: Yardstick) -> Errors:
-    """Measure Q, float64 of shape (S, A), in one pass."""
+    """Measure Q, float64 of shape (S, A), in one pass.
+
+    Examples
+    --------
+    >>> from rl_core.maze import Maze
+    >>> yardstick = make_yardstick(Maze().model(), np.ones((112, 4)), (112, 4))
+    >>> errors(np.zeros((112, 4)), yardstick).rmse
+    1.0
+    """
     Q_star, optimal, visitable = yardstick.Q_star, yardstick.optimal, yardstick.visitable
     if len(Q_star) == 0:
         return Errors(math.nan, math.nan, math.nan, math.nan)
@@ -251,22 +315,95 @@ def errors(Q: NDArray[np.float64], yardstick: Yardstick) -> Errors:
 
 
 @compiled
-def value_lost(Q: NDArray[np.float64], yardstick: Yardstick, gamma: float) -> float:
+def value_lost(
+    Q: NDArray[np.float64], yardstick: Yardstick, gamma: float, appraisal: Appraisal
+) -> float:
     """Return v*(s_0) - v_pi(s_0) for the greedy policy pi, which draws among ties uniformly.
 
     Averaged over the start states. NaN if Q* or the model is not known, or if the values do not
     settle (gamma = 1 and a policy that may go on for ever).
+
+    Parameters
+    ----------
+    Q : ndarray of float64, shape (S, A)
+        The action values.
+    yardstick : Yardstick
+        What is known of the world.
+    gamma : float
+        Discount, in [0, 1].
+    appraisal : Appraisal
+        What is known of the policy; it is brought up to date.
+
+    Examples
+    --------
+    >>> from rl_core.maze import Maze
+    >>> from rl_core.planning import value_iteration
+    >>> model = Maze().model()
+    >>> Q_star = value_iteration(model, gamma=0.9, tolerance=1e-10).Q
+    >>> yardstick = make_yardstick(model, Q_star, Q_star.shape)
+    >>> appraisal = new_appraisal(yardstick)
+    >>> abs(value_lost(Q_star, yardstick, 0.9, appraisal)) < 1e-9
+    True
+    >>> round(value_lost(np.zeros((112, 4)), yardstick, 0.9, appraisal), 3)
+    0.523
     """
-    start = yardstick.start_state
-    if len(start) == 0 or len(yardstick.Q_star) == 0:
+    if len(yardstick.start_state) == 0 or len(yardstick.Q_star) == 0:
         return math.nan
-    order = _reached(Q, yardstick)
-    V = np.zeros(len(yardstick.terminal))
+    if not _as_before(Q, appraisal):
+        _follow(Q, yardstick, appraisal)
+        appraisal.lost[0] = _loss(yardstick, gamma, appraisal)
+        if not math.isfinite(appraisal.lost[0]):
+            appraisal.V[:] = 0.0
+    return float(appraisal.lost[0])
+
+
+@compiled
+def _as_before(Q: NDArray[np.float64], appraisal: Appraisal) -> bool:
+    """Say whether the greedy policy takes the same actions in all states it can get to."""
+    for i in range(appraisal.found[0]):
+        s = appraisal.order[i]
+        best = np.max(Q[s])
+        for a in range(Q.shape[1]):
+            if (Q[s, a] == best) != appraisal.greedy[s, a]:
+                return False
+    return bool(appraisal.found[0] >= 0)
+
+
+@compiled
+def _follow(Q: NDArray[np.float64], yardstick: Yardstick, appraisal: Appraisal) -> None:
+    """Note which non-terminal states the greedy policy can get to, and what it does there."""
+    known = np.zeros(len(yardstick.terminal), dtype=np.bool_)
+    order, n_found, n_searched = appraisal.order, 0, 0
+    for s in yardstick.start_state:
+        if not yardstick.terminal[s]:
+            known[s] = True
+            order[n_found] = s
+            n_found += 1
+    while n_searched < n_found:
+        s = order[n_searched]
+        n_searched += 1
+        best = np.max(Q[s])
+        for a in range(Q.shape[1]):
+            appraisal.greedy[s, a] = Q[s, a] == best
+            for k in range(yardstick.successor.shape[2] if Q[s, a] == best else 0):
+                s_next = yardstick.successor[s, a, k]
+                possible = yardstick.probability[s, a, k] > 0.0
+                if possible and not known[s_next] and not yardstick.terminal[s_next]:
+                    known[s_next] = True
+                    order[n_found] = s_next
+                    n_found += 1
+    appraisal.found[0] = n_found
+
+
+@compiled
+def _loss(yardstick: Yardstick, gamma: float, appraisal: Appraisal) -> float:
+    """Value the policy by sweeps, in place, and compare it with the optimum; NaN: no values."""
+    order, V, start = appraisal.order, appraisal.V, yardstick.start_state
     for _ in range(MAX_SWEEPS):
         change = 0.0
-        for i in range(len(order) - 1, -1, -1):  # what was found last is nearest to the end
+        for i in range(appraisal.found[0] - 1, -1, -1):  # what was found last is nearest to the end
             s = order[i]
-            v = _backup(Q, V, yardstick, gamma, s)
+            v = _backup(V, appraisal.greedy, yardstick, gamma, s)
             change = max(change, abs(v - V[s]))
             V[s] = v
         if change <= TOLERANCE:
@@ -279,43 +416,17 @@ def value_lost(Q: NDArray[np.float64], yardstick: Yardstick, gamma: float) -> fl
 
 
 @compiled
-def _reached(Q: NDArray[np.float64], yardstick: Yardstick) -> NDArray[np.int32]:
-    """Return the non-terminal states that the greedy policy can get to, as a search finds them."""
-    n_states, n_actions = Q.shape
-    found = np.zeros(len(yardstick.terminal), dtype=np.bool_)
-    order = np.empty(n_states, dtype=np.int32)
-    n_found = n_searched = 0
-    for s in yardstick.start_state:
-        if not yardstick.terminal[s]:
-            found[s] = True
-            order[n_found] = s
-            n_found += 1
-    while n_searched < n_found:
-        s = order[n_searched]
-        n_searched += 1
-        best = np.max(Q[s])
-        for a in range(n_actions):
-            if Q[s, a] != best:
-                continue
-            for k in range(yardstick.successor.shape[2]):
-                s_next = yardstick.successor[s, a, k]
-                possible = yardstick.probability[s, a, k] > 0.0
-                if possible and not found[s_next] and not yardstick.terminal[s_next]:
-                    found[s_next] = True
-                    order[n_found] = s_next
-                    n_found += 1
-    return order[:n_found]
-
-
-@compiled
 def _backup(
-    Q: NDArray[np.float64], V: NDArray[np.float64], yardstick: Yardstick, gamma: float, s: int
+    V: NDArray[np.float64],
+    greedy: NDArray[np.bool_],
+    yardstick: Yardstick,
+    gamma: float,
+    s: int,
 ) -> float:
     """Return sum_a pi(a | s) sum_k p_k (r_k + gamma V(s'_k)) for the greedy policy pi."""
-    best = np.max(Q[s])
     total, ties = 0.0, 0
-    for a in range(Q.shape[1]):
-        if Q[s, a] == best:
+    for a in range(greedy.shape[1]):
+        if greedy[s, a]:
             ties += 1
             for k in range(yardstick.successor.shape[2]):
                 after = yardstick.reward[s, a, k] + gamma * V[yardstick.successor[s, a, k]]

@@ -20,11 +20,11 @@ from rl_core.exploration import (
 )
 from rl_core.maze import Maze
 from rl_core.mdp import MDP
-from rl_core.planning import value_iteration
+from rl_core.planning import optimal_actions, value_iteration
 from rl_core.provenance import describe
 from rl_core.q_learning import QLearningConfig, q_learning, q_learning_on_model
 from rl_core.tabular import spawn_streams
-from rl_core.tabular_record import COLUMNS
+from rl_core.tabular_record import COLUMNS, make_yardstick, new_appraisal, value_lost
 
 MEASURED = ("error_norm", "rmse", "rmse_visitable", "optimal_states", "value_lost")
 
@@ -287,11 +287,11 @@ def test_without_optimal_values_the_errors_are_missing(maze):
 
 def test_the_record_is_what_the_snapshots_say(maze, Q_star):
     config = QLearningConfig(exploration=EpsilonGreedy(0.7))
-    at = tuple(range(0, 401, 50))
+    at = tuple(range(0, 401, 25))  # between the evaluations too
     run = q_learning(maze, config, episodes=400, seeds=[4], Q_star=Q_star, snapshots=at)
     assert list(run.table.columns) == ["seed", "episode", *COLUMNS]
     visitable = maze.reachable_states() & ~maze.terminal
-    optimal = Q_star >= Q_star.max(axis=1, keepdims=True) - 1e-8
+    optimal = optimal_actions(Q_star)
     assert not run.arrays["Q_snapshots"][0, 0].any()
     for j, episode in enumerate(at[1:], start=1):
         Q, visits = run.arrays["Q_snapshots"][0, j], run.arrays["visits_snapshots"][0, j]
@@ -306,6 +306,25 @@ def test_the_record_is_what_the_snapshots_say(maze, Q_star):
         right = (~greedy | optimal).all(axis=1)
         assert row["optimal_states"] == right[visitable].sum()
         assert row["value_lost"] == pytest.approx(loss(maze, Q, Q_star), abs=1e-9)
+
+
+def test_the_value_lost_is_known_after_every_episode(maze, Q_star):
+    every = tuple(range(1, 61))
+    config = QLearningConfig(step_size=0.9, exploration=EpsilonGreedy(0.5))
+    run = q_learning(maze, config, episodes=60, seeds=[2], Q_star=Q_star, snapshots=every)
+    expected = [loss(maze, Q, Q_star) for Q in run.arrays["Q_snapshots"][0]]
+    assert run.table["value_lost"].tolist() == pytest.approx(expected, abs=1e-9)
+    assert len(set(np.round(expected, 6))) > 10
+
+
+def test_an_appraisal_goes_on_from_the_policy_before(maze, Q_star):
+    yardstick = make_yardstick(maze, Q_star, Q_star.shape)
+    appraisal, rng = new_appraisal(yardstick), np.random.default_rng(0)
+    for noise in (0.0, 0.02, 0.02, 0.3, 5.0, 0.0):
+        Q = Q_star + noise * rng.normal(size=Q_star.shape)
+        lost = value_lost(Q, yardstick, 0.9, appraisal)
+        assert lost == pytest.approx(loss(maze, Q, Q_star), abs=1e-9)
+        assert value_lost(2 * Q, yardstick, 0.9, appraisal) == lost  # the same policy
 
 
 def loss(mdp, Q, Q_star, gamma=0.9):
@@ -470,16 +489,20 @@ class Untouchable(Maze):
         ({"Q_star": np.zeros((112, 3))}, ValueError, r"Q_star .*\(112, 3\); .* \(112, 4\)"),
         ({"Q_star": np.full((112, 4), np.nan)}, ValueError, "Q_star has entries .* not finite"),
         ({"Q_star": [["a"] * 4] * 112}, TypeError, "Q_star has dtype"),
+        ({"Q_star": [[1.0], [1.0, 2.0]]}, ValueError, r"Q_star is \[\[1.0\].* \(112, 4\)"),
         ({"episodes": 0}, ValueError, "episodes is 0; allowed are integers from 1"),
         ({"episodes": 2.5}, TypeError, "episodes is 2.5"),
         ({"seeds": []}, ValueError, r"seeds is \[\]"),
         ({"seeds": [0, 0]}, ValueError, r"seeds is \[0, 0\]; allowed .* once"),
         ({"seeds": [-1]}, ValueError, "seeds is -1; allowed are integers from 0"),
+        ({"seeds": 3}, TypeError, "seeds is 3; allowed is a sequence of integers from 0"),
+        ({"snapshots": 5}, TypeError, "snapshots is 5; allowed is a sequence of integers from 0"),
         ({"snapshots": (11,)}, ValueError, "snapshots has 11; allowed are 0 to 10"),
         ({"config": {"gamma": 0.9}}, TypeError, "config is {'gamma': 0.9}"),
         ({"env": "MountainCar-v0"}, ValueError, "env has the observation space Box.*Discrete"),
         ({"env": "Blackjack-v1"}, ValueError, r"env has the observation space Tuple"),
         ({"env": 3}, TypeError, "env is 3; allowed is an MDP"),
+        ({"env": "Labyrinth-v0"}, ValueError, "env is 'Labyrinth-v0'; allowed are ids that Gymn"),
         ({"env": lambda: 3}, TypeError, "allowed is an MDP"),
     ],
 )
@@ -490,6 +513,40 @@ def test_wrong_arguments_are_refused_before_anything_runs(arguments, error, mess
     usual["env"] = Maze().model()
     with pytest.raises(error, match=message):
         q_learning(**{**usual, **arguments})
+
+
+def test_seeds_and_snapshots_may_be_arrays(maze):
+    config = QLearningConfig(exploration=EpsilonGreedy(0.9))
+    by_array = q_learning(maze, config, episodes=4, seeds=np.arange(3), snapshots=np.array([0, 4]))
+    same_bits(by_array, q_learning(maze, config, episodes=4, seeds=[0, 1, 2], snapshots=(0, 4)))
+
+
+class Unrelated(gym.Env):
+    """Two states, no model; what it calls `P` or `model` is something else."""
+
+    observation_space, action_space = spaces.Discrete(2), spaces.Discrete(2)
+
+    def reset(self, *, seed=None, options=None):  # noqa: D102
+        super().reset(seed=seed)
+        return 0, {}
+
+    def step(self, action):  # noqa: D102
+        return 1, float(action), True, False, {}
+
+
+@pytest.mark.parametrize(
+    "attributes",
+    [
+        *({"P": 3}, {"P": np.eye(3)}, {"P": "none"}, {"P": {0: 1.0}}, {"P": [[None]]}),
+        *({"P": [[[(1.0, 0, 0.0, False)], [3]]] * 2}, {"P": lambda s: s}),
+        *({"model": lambda self, x: x}, {"model": lambda self: 3}, {"model": 3}),
+    ],
+)
+def test_an_environment_may_use_the_names_of_a_model_for_something_else(attributes):
+    env = type("Odd", (Unrelated,), attributes)()
+    run = q_learning(env, QLearningConfig(), episodes=20, seeds=[0], Q_star=np.zeros((2, 2)))
+    assert run.table["value_lost"].isna().all()
+    assert run.arrays["visits"].sum() == 20
 
 
 def test_only_an_environment_with_a_model_is_played_by_its_model():
