@@ -1,12 +1,13 @@
 """Chapter 1's measures against hand calculations."""
 
 import numpy as np
+import pandas as pd
 import planning_study as study
 import pytest
 
 from rl_core.maze import Maze
 from rl_core.maze_figures import follow_policy
-from rl_core.planning import q_value_iteration, value_iteration
+from rl_core.planning import policy_iteration, q_value_iteration, value_iteration
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +60,77 @@ def test_a_round_of_policy_iteration_costs_its_sweeps(maze):
     assert ratios["round_cost"] >= 1.25
 
 
-def test_every_claim_of_the_section_has_criteria_and_is_judged_once(maze):
-    assert [claim.id for claim in study.CLAIMS] == ["1a", "1b", "1c", "1d", "1e"]
-    assert all(claim.criteria for claim in study.CLAIMS)
+def test_the_costs_count_evaluations_of_every_kind(maze):
+    table = study.costs(maze.model(), repeats=1).set_index("method")
+    q, ordered, swept, solved = (table.loc[method] for method in study.METHODS)
+    counts = ["evaluation sweeps", "linear solves"]
+    assert q[counts].tolist() == [0, 0]
+    assert q["backups"] == 448 * q["sweeps or rounds"]
+    # In a good order: 112 backups an evaluation sweep, 448 any other.
+    others = ordered["sweeps or rounds"] - ordered["evaluation sweeps"]
+    assert ordered["evaluation sweeps"] > 0
+    assert ordered["linear solves"] == 0
+    assert ordered["backups"] == 448 * others + 112 * ordered["evaluation sweeps"]
+    # Policy iteration: 448 an improvement, one of them before the first round.
+    improvements = 448 * (swept["sweeps or rounds"] + 1)
+    assert swept["backups"] == improvements + 112 * swept["evaluation sweeps"]
+    assert swept["linear solves"] == 0
+    assert solved["linear solves"] == solved["sweeps or rounds"] > 1
+    assert solved["evaluation sweeps"] == 0
+
+
+def test_the_progress_of_policy_iteration_is_that_of_its_swept_values(maze):
+    mdp = maze.model()
+    progress = study.progress(mdp)
+    V_star = value_iteration(mdp, gamma=0.9, tolerance=1e-12).V
+    for name, plan in (
+        ("value", q_value_iteration(mdp, gamma=0.9, threshold=1e-5)),
+        ("policy", policy_iteration(mdp, gamma=0.9, evaluation_threshold=1e-5)),
+    ):
+        table = progress[name]
+        assert table["backups"].tolist() == plan.table["backups"].tolist()
+        assert (table["error"].diff().dropna() < 0).all()
+    # The last round's Q is one step ahead of its values, which sweeps leave a little wrong.
+    error = progress["policy"]["error"].iloc[-1]
+    ahead = np.abs(plan.Q.max(axis=1) - V_star).max()
+    assert 0 < ahead <= 0.9 * error <= 0.9 * study.ERROR_BOUND * 1.2
+    assert error > 1e-8
+
+
+def test_the_table_decides_by_itself_and_a_wrong_one_is_found_out(maze):
+    Q = value_iteration(maze.model(), gamma=0.9).Q
+    assert study.decided_by_table(maze, Q) == 1
+    wrong = Q.copy()
+    wrong[maze.state(*maze.start)] = [9.0, 0.0, 0.0, 0.0]  # up, into the edge
+    assert study.decided_by_table(maze, wrong) == pytest.approx(1 - 1 / 104)
+
+
+def test_the_claims_are_judged_from_the_measures(maze):
+    course = study.measure(maze)
+    sample = pd.DataFrame([{**course, "seed": seed} for seed in range(4)])
+    sample = sample.assign(
+        error=[1e-6, 2e-6, 3e-6, 4e-6],
+        decided_pi=[1.0, 0.5, 1.0, 0.5],
+        round_cost=[2.0, 3.0, 4.0, 5.0],
+        coarseness=[50.0, 60.0, 70.0, 1e6],
+        misled=[0.8, 0.9, 0.8, 0.9],
+    )
+    found = {f.claim.id: f for f in study.findings(course, sample)}
+    estimates = {name: [e.estimate for e in f.evidence] for name, f in found.items()}
+    assert list(found) == [claim.id for claim in study.CLAIMS] == ["1a", "1b", "1c", "1d", "1e"]
+    assert estimates == {
+        "1a": pytest.approx([course["error"], 2.5e-6, 1.0]),
+        "1b": pytest.approx([1.0, 0.75]),
+        "1c": pytest.approx([course["round_cost"], 3.5]),
+        "1d": pytest.approx([course["coarseness"], 65.0]),
+        "1e": pytest.approx([1.0, course["misled"], 0.85]),
+    }
+    assert {name: f.verdict for name, f in found.items()} == {
+        "1a": "holds",
+        "1b": "holds in part",
+        "1c": "does not hold",
+        "1d": "holds in part",  # the interval of the median reaches from 50 to a million
+        "1e": "holds",
+    }
+    worse = study.findings({**course, "decided_table": 0.99}, sample)[-1]
+    assert worse.answers == ("no", "yes", "yes")
