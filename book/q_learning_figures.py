@@ -314,7 +314,7 @@ class _Stage:
             best = np.flatnonzero(Q[state] == Q[state].max())
             if len(best) > 1:
                 continue
-            optimal = self.world.Q_star[state, best[0]] >= self.world.Q_star[state].max() - 1e-8
+            optimal = self.world.optimal[state, best[0]]
             right += optimal
             colour = BLACK if optimal else VERMILLION
             arrows.append(self._arrow(x + 0.5, y + 0.5, int(best[0]), colour))

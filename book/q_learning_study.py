@@ -47,9 +47,15 @@ def arm(name: str, *, step_size=STEP_SIZE, exploration=None, snapshots=(), max_s
 
 
 FIGURE_9 = arm("figure 9", snapshots=tuple(sorted({0, *FILM_EPISODES, *SPLIT_EPISODES})))
-BY_STEP_SIZE = {x: arm(f"step size {x:g}", step_size=x) for x in STEP_SIZES}
+# Figure 9 itself is one of each sweep.
+BY_STEP_SIZE = {
+    x: FIGURE_9 if x == STEP_SIZE else arm(f"step size {x:g}", step_size=x) for x in STEP_SIZES
+}
 BY_EXPLOITATION = {
-    x: arm(f"exploitation {x:g}", exploration=EpsilonGreedy(round(1 - x, 6))) for x in EXPLOITATIONS
+    x: FIGURE_9
+    if x == EXPLOITATION
+    else arm(f"exploitation {x:g}", exploration=EpsilonGreedy(round(1 - x, 6)))
+    for x in EXPLOITATIONS
 }
 BY_TEMPERATURE = {
     x: arm(f"softmax, temperature {x:g}", exploration=Softmax(x)) for x in TEMPERATURES
@@ -57,15 +63,20 @@ BY_TEMPERATURE = {
 DECAYING_ARM = arm("step size decays with visits", step_size=DECAY)
 RISING_ARM = arm("exploitation rises from 0.1 to 0.9", exploration=EpsilonGreedy(RISING))
 FAULTY_ARM = arm("faulty softmax of 2018", exploration=UnnormalisedSoftmax(), max_steps=100)
-ARMS = [
-    FIGURE_9,
-    *BY_STEP_SIZE.values(),
-    *BY_EXPLOITATION.values(),
-    *BY_TEMPERATURE.values(),
-    DECAYING_ARM,
-    RISING_ARM,
-    FAULTY_ARM,
-]
+ARMS = list(
+    {
+        each.name: each
+        for each in (
+            FIGURE_9,
+            *BY_STEP_SIZE.values(),
+            *BY_EXPLOITATION.values(),
+            *BY_TEMPERATURE.values(),
+            DECAYING_ARM,
+            RISING_ARM,
+            FAULTY_ARM,
+        )
+    }.values()
+)
 DECAYING, RISES, FAULTY = (each.name for each in (DECAYING_ARM, RISING_ARM, FAULTY_ARM))
 
 CLAIMS = (
@@ -303,6 +314,28 @@ def levels(world: World, norms: np.ndarray) -> pd.DataFrame:
     """Figure 9's norm at the end, seed by seed; norms of shape (seeds, episodes)."""
     before, after = (norms[:, k : k + LATE].mean(axis=1) for k in (3_000, 4_000))
     return pd.DataFrame({"above_plateau": after - world.plateau, "change": after - before})
+
+
+def seeds_to_separate(stuck: int, seeds: int) -> int:
+    """From how many seeds on a share as measured would differ from one half, for all a test knows.
+
+    The 95% interval of a share p from n seeds is p +- 1.96 sqrt(p (1 - p) / n); it leaves out one
+    half from n = 1.96^2 p (1 - p) / (p - 1/2)^2 on. A share of one half would never differ: 0.
+    """
+    share = stuck / seeds
+    if share == 0.5:
+        return 0
+    return int(np.ceil(1.96**2 * share * (1 - share) / (share - 0.5) ** 2))
+
+
+def settled(norms: np.ndarray, within: float = 0.05) -> int:
+    """The episode from which on the median of the seeds stays this close to its level at the end.
+
+    0.05 is what the curve of 2018 is known to.
+    """
+    median = np.median(norms, axis=0)
+    away = np.flatnonzero(np.abs(median - median[-LATE:].mean()) > within)
+    return int(away[-1]) + 2 if len(away) else 1
 
 
 def figure_9_table(norms: np.ndarray) -> pd.DataFrame:

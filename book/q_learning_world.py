@@ -5,7 +5,7 @@ import pandas as pd
 from scipy.linalg import solve_continuous_lyapunov
 
 from rl_core.maze import Maze
-from rl_core.planning import value_iteration
+from rl_core.planning import optimal_actions, value_iteration
 
 GAMMA = 0.9
 REMEMBERED = 0.01
@@ -19,6 +19,7 @@ class World:
         self.maze = Maze()
         self.model = self.maze.model()
         self.Q_star = value_iteration(self.model, gamma=GAMMA, tolerance=1e-10, progress=False).Q
+        self.optimal = optimal_actions(self.Q_star)
         self.reachable = self.maze.reachable_states()
         self.visitable = self.reachable & ~self.model.terminal
         self.entries = int(self.visitable.sum()) * self.model.n_actions
@@ -33,8 +34,7 @@ class World:
 
     def wrong(self, Q: np.ndarray) -> np.ndarray:
         """Whether the greedy action of each visitable state is wrong; Q of shape (seeds, S, A)."""
-        best = self.Q_star[self.visitable]
-        best = best >= best.max(axis=1, keepdims=True) - 1e-8
+        best = self.optimal[self.visitable]
         values = Q[:, self.visitable]
         greedy = values >= values.max(axis=2, keepdims=True)
         return (greedy & ~best).any(axis=2)

@@ -97,24 +97,79 @@ def test_arms_differ_from_figure_9_in_one_setting():
         ]
         assert len(changed) <= 1, arm.name
         assert (arm.config.max_steps is None) == (arm is not study.FAULTY_ARM)
-    assert study.BY_STEP_SIZE[0.2].config == study.BY_EXPLOITATION[0.1].config == usual
+    assert study.BY_STEP_SIZE[0.2] is study.BY_EXPLOITATION[0.1] is study.FIGURE_9  # run once
+    changed = {arm.name: arm.config for arm in study.ARMS}
+    assert len({repr(config) for config in changed.values()}) == len(study.ARMS)
 
 
 def test_the_claims_are_judged_from_the_measures(world):
     names = [arm.name for arm in study.ARMS]
     measures = ["oscillation", "slowness", "error", "earned", "evenness", "norm", "unvisited"]
-    rows = [
-        {"arm": name, "seed": seed, "optimal_share": 1.0, "lost": 0.0}
-        | dict.fromkeys(measures, 1.0)
-        for name in names
-        for seed in range(4)
-    ]
-    level = pd.DataFrame({"above_plateau": [0.02] * 4, "change": [0.0] * 4})
-    found = {f.claim.id: f for f in study.findings(world, pd.DataFrame(rows), level)}
+    measures += ["optimal_share", "lost"]
+    # Every arm and measure has a value of its own, so that a swapped arm or measure shows.
+    table = pd.DataFrame(
+        [[10 + 10 * i + j for j in range(len(measures))] for i in range(len(names))],
+        index=names,
+        columns=measures,
+        dtype=float,
+    )
+    rows = table.rename_axis("arm").reset_index()
+    rows = pd.concat([rows.assign(seed=seed) for seed in (3, 1, 0, 2)])
+    level = pd.DataFrame({"above_plateau": [0.02] * 4, "change": [0.03] * 4})
+    found = {f.claim.id: f for f in study.findings(world, rows, level)}
     assert list(found) == [f"2{letter}" for letter in "abcdefghi"]
-    assert found["2i"].verdict == found["2h"].verdict == "holds"
-    assert found["2c"].verdict == "does not hold"  # all errors are the same here
-    assert found["2a"].answers == ("no", "no", "yes")
+
+    def of(measure, name):
+        return table.loc[name, measure]
+
+    low, cold = "figure 9", "softmax, temperature 0.1"
+    soft, rising = "softmax, temperature 1", "exploitation rises from 0.1 to 0.9"
+    fast, good = "step size 0.9", "step size 0.15"
+    explored = [low, *(f"exploitation {x:g}" for x in (0.2, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95))]
+    tried = [low, *(f"step size {x:g}" for x in (0.02, 0.05, 0.1, 0.15, 0.3, 0.5, 0.9))]
+    e8, e9, e2 = "exploitation 0.8", "exploitation 0.9", "exploitation 0.2"
+    expected = {
+        "2a": [
+            of("oscillation", fast) / of("oscillation", good),
+            of("slowness", "step size 0.02") / of("slowness", good),
+            of("error", good) / table.loc[tried, "error"].min(),
+        ],
+        "2b": [
+            min(of("earned", e8), of("earned", e9)) / table.loc[explored, "earned"].max(),
+            min(of("evenness", low), of("evenness", e2)) / table.loc[explored, "evenness"].max(),
+            max(of("error", low), of("error", e2)) / table.loc[explored, "error"].min(),
+        ],
+        "2c": [of("error", e9) / of("error", low), of("error", e8) / of("error", e2)],
+        "2d": [of(m, arm) / of(m, low) for arm in (soft, cold) for m in ("evenness", "error")],
+        "2e": [of("norm", low) - world.plateau, of("earned", low) / world.optimum],
+        "2f": [of("unvisited", arm) for arm in (e9, e8, low)],
+        "2g": [
+            of("earned", rising) / of("earned", e9),
+            of("unvisited", rising),
+            of("error", rising) / of("error", low),
+        ],
+        "2h": [0.02, 0.03],
+        "2i": [of("optimal_share", low), of("lost", low)],
+    }
+    estimates = {name: [e.estimate for e in f.evidence] for name, f in found.items()}
+    assert estimates == {name: pytest.approx(values) for name, values in expected.items()}
+    assert found["2h"].verdict == "holds"
+    assert found["2i"].answers == ("yes", "no")
+
+
+def test_how_many_seeds_tell_a_share_from_one_half():
+    assert study.seeds_to_separate(12, 30) == 93  # 1.96^2 x 0.24 / 0.01 = 92.2
+    assert study.seeds_to_separate(18, 30) == 93
+    assert study.seeds_to_separate(15, 30) == 0
+
+
+def test_a_curve_has_settled_once_it_stays_near_its_end():
+    norms = np.full((3, study.EPISODES), 8.0)
+    norms[:, :40] = 20.0
+    norms[1:, 70] = 8.06
+    assert study.settled(norms) == 72  # the episode after the 71st, which is away once more
+    norms[1:, 70] = 8.04
+    assert study.settled(norms) == 41
 
 
 def test_a_seed_that_never_gets_close_counts_to_the_end(world):
