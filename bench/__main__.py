@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pandas as pd
 
+from bench.table import markdown
+
 MODULES = ("planning", "q_learning", "reinforce", "dqn")
 RESULTS = Path(__file__).parent.parent / "results"
 
@@ -43,7 +45,8 @@ def measure(module: str) -> list[dict]:
 def main(modules: list[str]) -> None:
     """Measure, print the table as Markdown, keep it as `results/bench.csv`.
 
-    What the book shows is `book/data/bench.csv`: copy a measurement of all modules there.
+    What the book shows is `book/data/bench.csv`: copy a measurement of all modules there, and what
+    is printed into the README.
     """
     unknown = sorted(set(modules) - set(MODULES))
     if unknown:
@@ -55,11 +58,7 @@ def main(modules: list[str]) -> None:
     table = pd.DataFrame(gathered).assign(machine=machine(), date=f"{date.today()}")
     RESULTS.mkdir(exist_ok=True)
     table.to_csv(RESULTS / "bench.csv", index=False)
-    print(f"Measured on: {machine()}\n")
-    shown = table.drop(columns=["machine", "date"])
-    head = list(shown.columns)
-    lines = [head, ["---"] * len(head), *shown.astype(str).to_numpy().tolist()]
-    print("\n".join(f"| {' | '.join(line)} |" for line in lines))
+    print(markdown(table))
 
 
 if __name__ == "__main__":

@@ -13,8 +13,16 @@ The lines stand in `rl_core.q_episodes` (the loop), `rl_core.q_update` (targets 
 `rl_core.replay` (the memory). A terminal s' has no value; a step cut short by a cap is
 bootstrapped.
 
-Settings that solve CartPole-v1 through the plain loop stand in `tests/test_dqn.py` (`CART_POLE`),
-with how many of ten seeds they solve it for.
+CartPole-v1 trains through the plain loop. With these settings the average return of the last 50
+training episodes is 450 or more for most seeds (`tests/test_dqn.py` holds them to it):
+
+    config = DQNConfig(
+        hidden=(64, 64), biases=True, optimiser="adam", learning_rate=2e-3,
+        batch_size=128, memory_size=100_000, learning_starts=500,
+        update_every=4, copy_every=100, epsilon=Decay(1.0, 0.0, 8_000),
+        shaping=Shaping("rl_core.shaping:balance"), max_env_steps=80_000,
+    )
+    run = dqn("CartPole-v1", config, episodes=2_000, seeds=range(10))
 
 Sources: V. Mnih et al. (2015), Human-level control through deep reinforcement learning; R. S.
 Sutton and A. G. Barto, Reinforcement Learning: An Introduction (2018), sections 6.5 and 16.5.

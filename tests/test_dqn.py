@@ -519,13 +519,27 @@ CART_POLE = DQNConfig(
     hidden=(64, 64),
     biases=True,
     optimiser="adam",
-    learning_rate=1e-3,
-    batch_size=64,
-    memory_size=20_000,
+    learning_rate=2e-3,
+    batch_size=128,
+    memory_size=100_000,
     learning_starts=500,
-    copy_every=250,
-    epsilon=Decay(1.0, 0.02, 5_000),
+    update_every=4,
+    copy_every=100,
+    epsilon=Decay(1.0, 0.0, 8_000),
+    shaping=Shaping("rl_core.shaping:balance"),
+    max_env_steps=80_000,
 )
+
+
+@pytest.mark.slow
+def test_cart_pole_is_solved_through_the_plain_loop():
+    """An average return of at least 450 over the last 50 episodes, for most seeds.
+
+    The settings were chosen on the seeds 1000 to 1005, of which 5 got there.
+    """
+    table = dqn("CartPole-v1", CART_POLE, episodes=2_000, seeds=range(10)).table
+    last = table.groupby("seed")["return"].apply(lambda returns: returns.tail(50).mean())
+    assert (last >= 450).sum() >= 6
 
 
 # Bad input
