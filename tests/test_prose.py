@@ -22,7 +22,6 @@ CONSTANTS = {  # numbers of the worlds and of the sources, which no run changes
     "02_q_learning": {112, 92, 368},  # states, those that can be visited alive, their entries
     "05_continuous_reinforce": {0.07, 90, 10_000, 30},  # top speed, return that counts as solved,
     # an episode's length in an example, the number of seeds in the question
-    "06_evaluation": {600, 256, 84},  # episodes and widths of the published agents
 }
 EVERYWHERE = {2018, 95, 29}  # the year of the report, the intervals, the last seed
 NUMBER = re.compile(r"(?<![\w.])\d+(?:,\d{3})*(?:\.\d+)?(?![\w]|\.\d)")
