@@ -9,6 +9,13 @@ the actions taken, weighted by what followed them:
 for minibatches B of the episode, over several epochs, with Adam in place of the plain step. The
 factor gamma^t of the textbook's update is left out, as in the report and in common practice.
 
+CartPole-v1 is learned through the plain loop with
+
+    ReinforceConfig(gamma=0.995, hidden=(64,), learning_rate=2e-3, epochs=1)
+
+in 1,000 episodes: these settings were chosen on seeds 1000 to 1014, of which 13 came to an average
+return of at least 450 over the last 50 episodes. A test holds most of seeds 0 to 9 to the same.
+
     for each seed:
         draw the initial weights
         for each episode:
