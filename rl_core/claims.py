@@ -77,12 +77,23 @@ class Criterion:
         The bounds, both included.
     above : float
         A lower bound that is not included.
+
+    Raises
+    ------
+    ValueError
+        If the text has a "; ", which stands between criteria in the table of claims.
     """
 
     text: str
     at_least: float = -math.inf
     at_most: float = math.inf
     above: float = -math.inf
+
+    def __post_init__(self) -> None:
+        if "; " in self.text:
+            raise ValueError(
+                f"text must be without '; ', which ends a criterion, got {self.text!r}"
+            )
 
     def answer(self, evidence: Evidence) -> Answer:
         """Say "yes" if the whole interval is within the bounds, "no" if all of it is outside.

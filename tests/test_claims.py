@@ -64,6 +64,11 @@ def test_above_does_not_include_its_bound(low, high, answer):
     assert criterion.answer(Evidence(low, low, high, seeds=30)) == answer
 
 
+def test_a_criterion_is_one_sentence():
+    with pytest.raises(ValueError, match=r"text must be without '; '.*got 'a; b'"):
+        Criterion("a; b")
+
+
 def test_every_criterion_needs_its_evidence():
     with pytest.raises(ValueError, match="claim 1a has 2 criteria, not 1"):
         claim(FEW, MANY).judge(Evidence.exact(1))
