@@ -397,8 +397,8 @@ def relative_steps(table: np.ndarray, network: np.ndarray, rng: np.random.Genera
     drawn = rng.integers(len(table), size=(10_000, len(table)))
     drawn = drawn[~np.isnan(good[drawn]).all(axis=1)]  # without any network there is no ratio
     ratios = np.median(table[drawn], axis=1) / np.nanmedian(good[drawn], axis=1)
-    low, high = np.quantile(ratios, [0.025, 0.975])
-    estimate = np.median(table) / np.nanmedian(good)
+    low, high = (float(limit) for limit in np.quantile(ratios, [0.025, 0.975]))
+    estimate = float(np.median(table) / np.nanmedian(good))
     return Evidence(estimate, min(low, estimate), max(high, estimate), seeds=len(table))
 
 
