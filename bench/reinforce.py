@@ -131,6 +131,14 @@ def ours(name: str, seeds: range = SEEDS, **changes: int) -> int:
     return int(table["steps"].sum())
 
 
+def learned_share(name: str) -> float:
+    """Share of the steps of `ours`' beginning that are learned from: those of finished episodes."""
+    config = replace(CONFIGS[name], max_env_steps=BEGINNING["max_env_steps"])
+    episodes = BEGINNING["episodes"]
+    table = reinforce.reinforce(name, config, episodes=episodes, seeds=SEEDS).table
+    return float(table.loc[table["terminated"], "steps"].sum() / table["steps"].sum())
+
+
 def a2c(name: str, seed: int, steps: int = 20_000) -> int:
     """Stable-Baselines3's A2C with 16 environments, network and learning rate the same."""
     model = A2C(
@@ -281,6 +289,7 @@ def training_rows() -> Iterator[dict]:
             ways["a2c"] = lambda seed, name=name: a2c(name, seed)
         best = best_of(ways, ROUNDS)
         note = f"usual loop: Gymnasium and torch, one network; ours: 30 seeds; {beginning}"
+        note += f"; {learned_share(name):.0%} of our steps are in finished episodes, learned from"
         if name != "MountainCarContinuous-v0":
             note += f"; {where_time_goes(name)}"
         yield row(f"REINFORCE on {name}", best["usual"], best["ours"], note)

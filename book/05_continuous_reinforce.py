@@ -36,7 +36,7 @@ from reinforce_figures import before_and_after
 from seeds import SEEDS
 
 from rl_core import figures
-from rl_core.claims import details, record, verdicts
+from rl_core.claims import details, record, verdicts, what_it_would_take
 from rl_core.rollouts import rollout, weights_of
 
 figures.use_style()
@@ -362,7 +362,7 @@ figures.captioned(verdicts(findings), "Table 5.4. The report's claims about cont
 figures.captioned(details(findings), "Table 5.5. Each criterion with its evidence.")
 
 # %% tags=["remove-cell"]
-glue("open", study.what_it_would_take(findings), display=False)
+glue("open", what_it_would_take(findings), display=False)
 best = study.closest(curves, 3_000, 200)
 glue("closest", best, display=False)
 glue("closest-steps", float(np.median(curves.at(best, 3_000)[curves.learned(best)])), display=False)

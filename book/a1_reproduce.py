@@ -25,15 +25,15 @@
 # make pdf             # the book as one file
 # ```
 #
-# Python 3.11, make and git are all it needs; a browser (Chromium) is used for the last step of `make test` and for `make pdf`. Once
-# installed, nothing needs a network.
+# Python 3.11, make and git are all it needs; a browser (Chromium) is used for the last step of `make test` and for `make pdf`. Setting up
+# and `make bench` install packages from the network; nothing else needs one.
 #
 # ## Randomness
 #
 # A run is a pure function of environment, configuration, number of episodes and seed. From one `numpy.random.SeedSequence(seed)` four
 # independent streams are spawned: for the environment, for the actions, for the network (initial weights, order of the samples) and for the replay
 # memory. No global random state is read or changed. The same seed gives the same bits alone or among others, on one worker or
-# several, in one go or after having been killed; tests hold this to the bit. Published are the seeds 0 to 29. Whatever had to be chosen, such as
+# several, in one go or after having been killed; tests hold this to the bit. This copy of the book stands on the seeds 0 to {glue:text}`last-seed`. Whatever had to be chosen, such as
 # caps and budgets, was chosen on seeds from 1000 on.
 #
 # ## Versions
@@ -42,9 +42,13 @@
 from pathlib import Path
 
 import provenance
+from myst_nb import glue
+from seeds import SEEDS
 
 from rl_core import figures
 
+glue("seeds", len(SEEDS), display=False)
+glue("last-seed", SEEDS[-1], display=False)
 RESULTS = Path("../results")
 made = provenance.read(RESULTS)
 figures.captioned(
@@ -75,7 +79,7 @@ figures.captioned(
 #
 # | 2018 | here | why |
 # |---|---|---|
-# | one run a curve | 30 seeds, intervals, failures counted | one run shows what can happen, not what does |
+# | one run a curve | {glue:text}`seeds` seeds, intervals, failures counted | one run shows what can happen, not what does |
 # | OpenAI gym of 2018 | Gymnasium; for Acrobot, MountainCar and MountainCarContinuous compiled twins | the twins are tested against Gymnasium step by step, to the bit |
 # | TensorFlow 1.5 | networks and optimisers compiled with numba, tested against PyTorch | speed; Adam and RMSProp keep TensorFlow's constants and the place of their epsilon |
 # | no time limits; capped episodes thrown away or left out of the curves | no time limits; capped episodes stay in the tables, and are learned from or not as stated | a curve without its failures says too much |

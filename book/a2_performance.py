@@ -51,15 +51,15 @@ study.bench_figure(bench)
 
 # %% [markdown]
 # :::{container} caption
-# :name: figure-s7-1
-# **Figure S7.1.** How many times as long the rival takes (logarithmic). Left of the line at 1 ours would be slower.
+# :name: figure-b-1
+# **Figure B.1.** How many times as long the rival takes (logarithmic). Left of the line at 1 ours would be slower.
 # Data: {download}`CSV <data/bench.csv>`.
 # :::
 
 # %% tags=["hide-input"]
 figures.captioned(
     bench[["benchmark", "rival", "ours", "ratio", "unit", "note"]].fillna(""),
-    "Table 7.1. The same in numbers.",
+    "Table B.1. The same in numbers.",
     formats=dict.fromkeys(["rival", "ours", "ratio"], "{:.4g}"),
 )
 
@@ -74,16 +74,16 @@ growth = [study.by_seeds(), study.by_episodes(), study.by_states()]
 
 # %% tags=["hide-input"] mystnb={"image": {"alt": "Three line charts on logarithmic axes: seconds against seeds, episodes and states, each close to the dashed line of proportional growth."}}
 for table in growth:
-    table.to_csv(FIGURES / f"figure_s7_2_{table.columns[0]}.csv", index=False)
+    table.to_csv(FIGURES / f"figure_b_2_{table.columns[0]}.csv", index=False)
     glue(f"growth-{table.columns[0]}", study.growth(table), display=False)
 study.growth_figure(growth)
 
 # %% [markdown]
 # :::{container} caption
-# :name: figure-s7-2
-# **Figure S7.2.** Seconds of 50 episodes of REINFORCE against seeds, of one seed against episodes, and of value iteration
-# against states. Dashed: growth in proportion. Data: {download}`seeds <../results/figures/figure_s7_2_seeds.csv>`,
-# {download}`episodes <../results/figures/figure_s7_2_episodes.csv>`, {download}`states <../results/figures/figure_s7_2_states.csv>`.
+# :name: figure-b-2
+# **Figure B.2.** Seconds of 50 episodes of REINFORCE against seeds, of one seed against episodes, and of value iteration
+# against states. Dashed: growth in proportion. Data: {download}`seeds <../results/figures/figure_b_2_seeds.csv>`,
+# {download}`episodes <../results/figures/figure_b_2_episodes.csv>`, {download}`states <../results/figures/figure_b_2_states.csv>`.
 # :::
 #
 # The time grows with the number of seeds to the power of {glue:text}`growth-seeds:.2f`, with the number of episodes to the power of

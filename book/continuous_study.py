@@ -9,12 +9,11 @@ were chosen on the same seeds: from its first success on, no seed that learned n
 250,000 steps for an episode, and none needed more than the budget besides its stopped episodes.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from reinforce_study import seeds_to_tell
 from seeds import SEEDS
 
 from rl_core.arm import Arm
@@ -415,21 +414,6 @@ def closest(curves: Curves, episode: int, steps: float) -> str:
         if curves.learned(arm).sum() > len(SEEDS) / 2
     }
     return min(medians, key=lambda arm: abs(medians[arm] - steps), default="as reported")
-
-
-def what_it_would_take(findings: Sequence[Finding]) -> str:
-    """The open criteria, and how many seeds would probably settle each."""
-    parts = []
-    for finding in findings:
-        for number, (criterion, evidence, answer) in enumerate(
-            zip(finding.claim.criteria, finding.evidence, finding.answers, strict=True), 1
-        ):
-            bound = criterion.at_least
-            if answer == "open" and np.isfinite(evidence.high - evidence.low - bound):
-                same = evidence.estimate == bound or evidence.seeds == 0
-                seeds = "no number" if same else f"{seeds_to_tell(evidence, bound):,}"
-                parts.append(f"{finding.claim.id}, criterion {number}: {seeds}")
-    return "; ".join(parts) or "none is open"
 
 
 def _steps(values: np.ndarray, rng: np.random.Generator) -> Evidence:

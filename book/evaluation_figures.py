@@ -99,7 +99,9 @@ def steps_and_returns(policies: pd.DataFrame, gentle: pd.DataFrame) -> Figure:
             title = name if column == 0 else ""
             label(axes, x="mean steps (log scale)", y=rewards, title=title)
     by_hand = {"color": COLOURS[3], "marker": "D", "ls": ":", "ms": 4, "lw": 1}
-    grid[2, 0].plot(gentle["steps"], gentle["return"], **by_hand, label="by hand, ever more gently")
+    arrived = gentle[gentle["reached"] == 1]
+    label_by_hand = "by hand, ever more gently"
+    grid[2, 0].plot(arrived["steps"], arrived["return"], **by_hand, label=label_by_hand)
     handles = dict(zip(*grid[2, 0].get_legend_handles_labels()[::-1], strict=True))
     handles |= dict(zip(*grid[0, 0].get_legend_handles_labels()[::-1], strict=True))
     grid[2, 1].legend(handles.values(), handles.keys(), loc="center", fontsize=10)

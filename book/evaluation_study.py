@@ -353,7 +353,11 @@ CLAIMS = (
         "Wall-clock time for one run: 2 and 3 minutes (REINFORCE), 3 and 5 seconds (DQN), "
         "3 minutes (continuous).",
         tuple(
-            Criterion(f"{name}: the report's {seconds} s at least 1 times ours", at_least=1)
+            Criterion(
+                f"{name}: one run takes at most the report's {seconds} s (the report's time is at "
+                "least 1 times ours)",
+                at_least=1,
+            )
             for name, seconds in TIMES.items()
         ),
         "Table 6.8",
@@ -378,6 +382,26 @@ def agreement(policies: pd.DataFrame, by: str, name: str) -> Evidence:
     return Evidence(estimate, min(low, estimate), max(high, estimate), seeds=n)
 
 
+def relative_steps(table: np.ndarray, network: np.ndarray, rng: np.random.Generator) -> Evidence:
+    """Median steps of tables over those of networks that learned; the bootstrap draws both.
+
+    Parameters
+    ----------
+    table, network : ndarray of shape (seeds,)
+        Mean steps, of the same seeds. A draw of seeds takes the tables and the networks of these.
+    rng : numpy.random.Generator
+    """
+    good = np.where(network <= LEARNED, network, np.nan)
+    if np.isnan(good).all():
+        return Evidence.none()
+    drawn = rng.integers(len(table), size=(10_000, len(table)))
+    drawn = drawn[~np.isnan(good[drawn]).all(axis=1)]  # without any network there is no ratio
+    ratios = np.median(table[drawn], axis=1) / np.nanmedian(good[drawn], axis=1)
+    low, high = (float(limit) for limit in np.quantile(ratios, [0.025, 0.975]))
+    estimate = float(np.median(table) / np.nanmedian(good))
+    return Evidence(estimate, min(low, estimate), max(high, estimate), seeds=len(table))
+
+
 def findings(results: Results, policies: pd.DataFrame) -> list[Finding]:
     """Hold the thirty seeds against the criteria."""
     rng = np.random.default_rng(np.random.SeedSequence(2023))
@@ -385,9 +409,7 @@ def findings(results: Results, policies: pd.DataFrame) -> list[Finding]:
     def relative(name: str) -> Evidence:
         network = steps_of(policies, name, "REINFORCE", "as learned")
         table = steps_of(policies, name, f"table, {chosen_bins(name)} bins", "greedy")
-        good = network[network <= LEARNED]
-        ratio = table / (np.median(good) if len(good) else np.inf)
-        return Evidence(*bootstrap_interval(ratio, rng=rng), seeds=len(ratio))
+        return relative_steps(table, network, rng)
 
     def share(name: str) -> Evidence:
         table = steps_of(policies, name, f"table, {chosen_bins(name)} bins", "greedy")
@@ -436,17 +458,27 @@ def agreements(policies: pd.DataFrame) -> pd.DataFrame:
 
 
 def gentle(forces: Sequence[float]) -> pd.DataFrame:
-    """A hand-made driver of MountainCarContinuous: push the way the car moves, so hard only."""
+    """A hand-made driver of MountainCarContinuous: push the way the car moves, so hard only.
+
+    `reached` is the share of episodes that get to the goal: with too little force none does, since
+    the wall on the left takes what speed the car has there.
+    """
     world = binned(ENV["MountainCarContinuous"], (1, 2), levels=2)
     along = np.array([[1.0, 0.0], [0.0, 1.0]])
     rows = []
     for force in forces:
         softer = world._replace(actions=(world.actions * force).astype(np.float32))
         played = evaluate_table(softer, along, seed=0, episodes=EPISODES, max_steps=10 * CAP)
-        rows.append(
-            {"force": force, "steps": played["steps"].mean(), "return": played["return"].mean()}
-        )
+        means = {name: played[name].mean() for name in ("steps", "return")}
+        rows.append({"force": force, **means, "reached": played["terminated"].mean()})
     return pd.DataFrame(rows)
+
+
+def gentlest(drivers: pd.DataFrame) -> tuple[pd.Series, pd.Series]:
+    """Of `gentle`'s drivers: the one with the least force that always arrives, and the next."""
+    by_force = drivers.sort_values("force", ascending=False, ignore_index=True)
+    arriving = int((by_force["reached"] == 1).cummin().sum())
+    return by_force.loc[arriving - 1], by_force.loc[arriving]
 
 
 def refinement(found: dict[str, list[Fastest]]) -> pd.DataFrame:

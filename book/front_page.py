@@ -15,6 +15,7 @@ import pandas as pd
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
+from rl_core import claims as judged
 from rl_core.figures import BLUE, GREY
 
 VERDICTS = {  # in the order of the page: what failed stands first
@@ -132,15 +133,9 @@ def linked(text: str) -> str:
 
 
 def _measured(row: pd.Series) -> str:
-    estimate, low, high = (_number(row[name]) for name in ("estimate", "low", "high"))
+    estimate, low, high = (judged.number(row[name]) for name in ("estimate", "low", "high"))
     interval = "" if row["low"] == row["high"] else f" <small>[{low}, {high}]</small>"
     return f"<b>{estimate}</b>{interval}"
-
-
-def _number(value: float) -> str:
-    if np.isinf(value):
-        return "∞"
-    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
 
 
 def _row(row: pd.Series) -> str:
@@ -148,7 +143,7 @@ def _row(row: pd.Series) -> str:
     more = "".join(f"<li>{html.escape(other)}</li>" for other in others)
     rest = f"<details><summary>and {len(others)} more</summary><ul>{more}</ul></details>"
     verdict = row["verdict"]
-    seeds = "exact" if row["seeds"] == 0 else f"{row['seeds']}"
+    seeds = "exact" if row["seeds"] == 0 and row["low"] == row["high"] else f"{row['seeds']}"
     cells = {
         "id": f'<a href="{PAGES[chapter_of(row)]}.html#verdicts">{row["id"]}</a>',
         "claim of 2018": html.escape(row["claim"]),
@@ -176,8 +171,9 @@ def claims_table(table: pd.DataFrame) -> str:
     body = "\n".join(_row(row) for _, row in grouped.iterrows())
     return (
         '<table class="claims sortable"><caption>Every claim of the report, with its verdict. '
-        "Measured: the first quantity of its criterion and the 95% interval. A click on a heading "
-        f"sorts.</caption><thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table>"
+        "Measured: the first quantity of its criterion and the 95% interval."
+        '<span class="sorts"> A click on a heading sorts.</span></caption>'
+        f"<thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table>"
     )
 
 

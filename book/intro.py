@@ -88,7 +88,8 @@ made = provenance.read(RESULTS)
 processors = " and ".join(sorted(made["processor"].unique()))
 figures.captioned(
     provenance.by_chapter(made),
-    f"Table 0.1. Experiments of the chapters and their time on one core ({processors}). A run is one seed of one arm.",
+    f"Table 0.1. Experiments of the chapters and the time their training took on one core ({processors}). "
+    "A run is one seed of one arm. Not counted: planning, evaluation, statistics and drawing.",
     formats={"one core (min)": "{:.1f}"},
 )
 

@@ -24,5 +24,33 @@ def chosen(text: str) -> range:
     return range(int(text))
 
 
+def premise(sentence: str, holds: bool, *, preview: bool | None = None) -> None:
+    """Stop the book if the data no longer bear out a sentence of it.
+
+    Parameters
+    ----------
+    sentence : str
+        The sentence, or the words that lean on the data.
+    holds : bool
+        Whether they do.
+    preview : bool, optional
+        Whether this is a first look with too few seeds to hold sentences to; by default as set.
+
+    Raises
+    ------
+    AssertionError
+        If they do not.
+
+    Examples
+    --------
+    >>> premise("One and one is two.", 1 + 1 == 2)
+    >>> premise("One and one is three.", 1 + 1 == 3, preview=False)
+    Traceback (most recent call last):
+    AssertionError: the data do not bear out: One and one is three.
+    """
+    if not holds and not (PREVIEW if preview is None else preview):
+        raise AssertionError(f"the data do not bear out: {sentence}")
+
+
 SEEDS = chosen(os.environ.get("SEEDS") or str(FULL))
 PREVIEW = len(SEEDS) < FULL

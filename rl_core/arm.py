@@ -24,7 +24,8 @@ class Arm:
     algorithm : callable
         `algorithm(env, config, *, episodes, seeds, snapshots=(), progress=None) -> Run`, a function
         that can be imported, so that a worker can find it. It must be pure: the same bits for a
-        seed alone or among others.
+        seed alone or among others. If a function `check_<algorithm>(env, config)` stands beside it
+        in its module, it is asked before anything runs (`check`).
     env : str
         The environment's id.
     config : dataclass
@@ -78,6 +79,32 @@ class Arm:
         module = getattr(self.algorithm, "__module__", None)
         return f"{module}:{getattr(self.algorithm, '__qualname__', None)}"
 
+    def check(self) -> None:
+        """Raise what the algorithm would raise for this environment and configuration.
+
+        The configuration has to be of the class that the algorithm's `config` is annotated with;
+        the rest is told by `check_<algorithm>`, where there is one.
+
+        Raises
+        ------
+        TypeError, ValueError
+            With the arm's name in front.
+        """
+        expected = getattr(self.algorithm, "__annotations__", {}).get("config")
+        if isinstance(expected, type) and not isinstance(self.config, expected):
+            raise TypeError(
+                f"arm {self.name!r}: config is {self.config!r}; allowed is a {expected.__name__}"
+            )
+        module, _, name = self.algorithm_name.partition(":")
+        check = getattr(sys.modules[module], f"check_{name}", None)
+        if check is None:
+            return
+        try:
+            check(self.env, self.config)
+        except (TypeError, ValueError) as error:
+            kind = TypeError if isinstance(error, TypeError) else ValueError
+            raise kind(f"arm {self.name!r}: {error}") from error
+
     def identity(self) -> dict[str, Any]:
         """Return all that decides the bits of this arm's results, the seed aside, as JSON."""
         module, _, _ = self.algorithm_name.partition(":")
@@ -94,7 +121,21 @@ class Arm:
 
 
 def check_integer(name: str, value: object, least: int) -> None:
-    """Raise unless `value`, called `name` in the message, is an integer from `least`."""
+    """Raise unless `value`, called `name` in the message, is an integer from `least`.
+
+    Raises
+    ------
+    TypeError
+        If it is no integer, or a bool.
+    ValueError
+        If it is below `least`.
+
+    Examples
+    --------
+    >>> check_integer("workers", 0, least=1)
+    Traceback (most recent call last):
+    ValueError: workers has 0; allowed are integers from 1
+    """
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
         raise TypeError(f"{name} has {value!r}; allowed are integers from {least}")
     if value < least:

@@ -49,6 +49,17 @@ class Evidence:
             raise ValueError(f"seeds must not be negative, not {self.seeds}")
 
     @classmethod
+    def none(cls) -> "Evidence":
+        """Evidence of no seed at all, such as of those that learned where none did: all is open.
+
+        Examples
+        --------
+        >>> Criterion("at most 100 steps", at_most=100).answer(Evidence.none())
+        'open'
+        """
+        return cls(math.inf, -math.inf, math.inf, seeds=0)
+
+    @classmethod
     def exact(cls, value: float) -> "Evidence":
         """Evidence in which nothing is random."""
         return cls(value, value, value, seeds=0)
@@ -66,12 +77,23 @@ class Criterion:
         The bounds, both included.
     above : float
         A lower bound that is not included.
+
+    Raises
+    ------
+    ValueError
+        If the text has a "; ", which stands between criteria in the table of claims.
     """
 
     text: str
     at_least: float = -math.inf
     at_most: float = math.inf
     above: float = -math.inf
+
+    def __post_init__(self) -> None:
+        if "; " in self.text:
+            raise ValueError(
+                f"text must be without '; ', which ends a criterion, got {self.text!r}"
+            )
 
     def answer(self, evidence: Evidence) -> Answer:
         """Say "yes" if the whole interval is within the bounds, "no" if all of it is outside.
@@ -179,6 +201,76 @@ class Finding:
         }
 
 
+def number(value: float) -> str:
+    """A measured number as text: three digits, and whole from a thousand on.
+
+    Examples
+    --------
+    >>> [number(value) for value in (0.12345, 999.7, -1234.5, math.inf, -math.inf)]
+    ['0.123', '1,000', '−1,234', '∞', '−∞']
+    """
+    if math.isinf(value):
+        text = "∞" if value > 0 else "-∞"
+    else:
+        text = f"{value:,.0f}" if abs(value) >= 999.5 else f"{value:.3g}"
+    return f"−{text[1:]}" if text.startswith("-") else text
+
+
+def seeds_to_tell(criterion: Criterion, evidence: Evidence) -> float:
+    """Seeds at which an interval, shrinking with their root, would hold no bound any more.
+
+    Half an interval's width over n seeds is proportional to 1 / sqrt(n). If the estimate stayed
+    what it is, the bound would be left behind at n (half width / distance to the bound)^2 seeds.
+
+    Parameters
+    ----------
+    criterion : Criterion
+    evidence : Evidence
+        With which it is open.
+
+    Returns
+    -------
+    float
+        Rounded up to tens; infinite where no number of seeds would do, because the estimate is the
+        bound, or the interval has no end.
+
+    Examples
+    --------
+    >>> tenth = Criterion("at least a tenth", at_least=0.1)
+    >>> seeds_to_tell(tenth, Evidence(0.2, 0.0, 0.4, seeds=30))
+    120
+    """
+    half = (evidence.high - evidence.low) / 2
+    bounds = (criterion.at_least, criterion.at_most, criterion.above)
+    held = [bound for bound in bounds if evidence.low <= bound <= evidence.high]
+    distance = min((abs(evidence.estimate - bound) for bound in held), default=math.nan)
+    if not (math.isfinite(half) and distance > 0 and math.isfinite(distance)):
+        return math.inf
+    return math.ceil(evidence.seeds * (half / distance) ** 2 / 10) * 10
+
+
+def what_it_would_take(findings: Sequence[Finding]) -> str:
+    """Say which criteria are open, and how many seeds would probably settle each.
+
+    Examples
+    --------
+    >>> claim = Claim("9a", "9", "Few.", (Criterion("at most 2", at_most=2),), "Figure 9")
+    >>> what_it_would_take([claim.judge(Evidence(1, 0, 3, seeds=30))])
+    '9a, criterion 1: 70'
+    >>> what_it_would_take([claim.judge(Evidence.exact(1))])
+    'none is open'
+    """
+    parts = []
+    for finding in findings:
+        criteria = zip(finding.claim.criteria, finding.evidence, finding.answers, strict=True)
+        for place, (criterion, evidence, answer) in enumerate(criteria, 1):
+            if answer == "open":
+                seeds = seeds_to_tell(criterion, evidence)
+                text = f"{seeds:,}" if math.isfinite(seeds) else "no number"
+                parts.append(f"{finding.claim.id}, criterion {place}: {text}")
+    return "; ".join(parts) or "none is open"
+
+
 def verdicts(findings: Sequence[Finding]) -> pd.DataFrame:
     """One row for each claim: its verdict and where to look."""
     rows = pd.DataFrame([finding.row() for finding in findings], columns=list(COLUMNS))
@@ -195,7 +287,8 @@ def details(findings: Sequence[Finding]) -> pd.DataFrame:
             {
                 "id": finding.claim.id,
                 "criterion": criterion.text,
-                "measured": f"{evidence.estimate:.3g} [{evidence.low:.3g}, {evidence.high:.3g}]",
+                "measured": f"{number(evidence.estimate)} "
+                f"[{number(evidence.low)}, {number(evidence.high)}]",
                 "seeds": evidence.seeds,
                 "met": answer,
             }
@@ -229,6 +322,17 @@ def record(findings: Sequence[Finding], folder: Path, *, chapter: str) -> pd.Dat
     ------
     ValueError
         If a claim is given twice, here or in another chapter.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> claim = Claim("9a", "9", "Few.", (Criterion("at most 2", at_most=2),), "Figure 9")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     rows = record([claim.judge(Evidence.exact(1))], Path(folder), chapter="9")
+    ...     sorted(path.name for path in Path(folder).iterdir())
+    ['claims', 'claims.csv']
+    >>> rows["verdict"].tolist()
+    ['holds']
     """
     rows = pd.DataFrame([finding.row() for finding in findings], columns=list(COLUMNS))
     parts = folder / "claims"

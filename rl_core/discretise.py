@@ -28,6 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rl_core import dynamics
 from rl_core.compiled import compiled
+from rl_core.episodes import make_environment
 from rl_core.policies import is_integer, require
 
 MAX_CELLS = 2**31 - 1
@@ -201,7 +202,7 @@ class Discretised(gymnasium.Wrapper[Any, Any, Any, Any]):
         low: ArrayLike | None = None,
         high: ArrayLike | None = None,
     ) -> None:
-        made = gymnasium.make(env) if isinstance(env, str) else env() if callable(env) else env
+        made = make_environment(env) if isinstance(env, str) else env() if callable(env) else env
         if not isinstance(made, gymnasium.Env):
             raise TypeError(f"env must be an id, an environment or a function, got {env!r}")
         self.grid = make_grid(made.observation_space, bins, low=low, high=high)

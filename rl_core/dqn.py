@@ -40,9 +40,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from rl_core import networks
-from rl_core.episodes import EnvironmentLike, checked_seeds, spawn_streams
+from rl_core.episodes import EnvironmentLike, checked_seeds, checked_snapshots, spawn_streams
 from rl_core.epsilon import Decay, Epsilon, HalfWay
-from rl_core.policies import is_integer, is_number, require
+from rl_core.policies import is_integer, is_number, is_one_of, require
 from rl_core.q_episodes import DIVERGED, SHAPED_NAN, Training, World, open_world
 from rl_core.q_update import Settings, make_learner
 from rl_core.replay import make_memory
@@ -135,7 +135,7 @@ class DQNConfig:
                 "a tuple of positive integers",
             ),
             "biases": (isinstance(self.biases, bool), "a bool"),
-            "optimiser": (self.optimiser in optimisers, f"one of {optimisers}"),
+            "optimiser": (is_one_of(self.optimiser, optimisers), f"one of {optimisers}"),
             "learning_rate": (is_number(rate) and rate > 0, "a finite number above 0"),
             "batch_size": (is_integer(batch, 1), "a positive integer"),
             "epsilon": (
@@ -244,6 +244,24 @@ def _train(
     return trained
 
 
+def check_dqn(env: EnvironmentLike, config: DQNConfig) -> None:
+    """Raise what `dqn` would raise for an environment and a configuration; run nothing.
+
+    `rl_core.experiments.run` calls it for every arm before it begins with any.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If `config` is no DQNConfig, the environment unknown, or its spaces of another kind.
+
+    Examples
+    --------
+    >>> check_dqn("MountainCar-v0", DQNConfig())
+    """
+    require(isinstance(config, DQNConfig), "config", config, "a DQNConfig")
+    open_world(env).close()
+
+
 def dqn(
     env: EnvironmentLike,
     config: DQNConfig,
@@ -303,9 +321,9 @@ def dqn(
     seeds = checked_seeds(seeds)
     require(isinstance(config, DQNConfig), "config", config, "a DQNConfig")
     require(is_integer(episodes, 1), "episodes", episodes, "a positive integer")
-    for episode in snapshots:
-        valid = is_integer(episode, 0) and episode <= episodes
-        require(valid, "snapshots", snapshots, f"integers from 0 to {episodes}")
+    snapshots = checked_snapshots(snapshots, episodes)
+    allowed = "a function of episodes and steps, or None"
+    require(progress is None or callable(progress), "progress", progress, allowed)
     trained: list[_Seed] = []
     for seed in seeds:
         steps_before = sum(one.env_steps for one in trained)

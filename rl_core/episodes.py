@@ -14,7 +14,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from rl_core import dynamics
+from rl_core import dynamics, networks
 from rl_core.compiled import compiled
 from rl_core.policies import Policy, choose_action, draw_noise, is_integer, require
 
@@ -35,11 +35,33 @@ def checked_seeds(seeds: Iterable[int]) -> tuple[int, ...]:
     >>> checked_seeds(range(3))
     (0, 1, 2)
     """
+    require(isinstance(seeds, Iterable), "seeds", seeds, "one or more non-negative integers")
     given = tuple(seeds)
     valid = len(given) > 0 and all(is_integer(seed, 0) for seed in given)
     require(valid, "seeds", given, "one or more non-negative integers")
     require(len(set(given)) == len(given), "seeds", given, "distinct")
     return tuple(int(seed) for seed in given)
+
+
+def checked_snapshots(snapshots: Iterable[int], episodes: int) -> tuple[int, ...]:
+    """Return the episodes after which to keep a copy, if they are integers from 0 to `episodes`.
+
+    Raises
+    ------
+    ValueError
+        If they are not.
+
+    Examples
+    --------
+    >>> checked_snapshots((n for n in (0, 20)), episodes=20)
+    (0, 20)
+    """
+    allowed = f"integers from 0 to {episodes}"
+    require(isinstance(snapshots, Iterable), "snapshots", snapshots, allowed)
+    given = tuple(snapshots)
+    valid = all(is_integer(episode, 0) and episode <= episodes for episode in given)
+    require(valid, "snapshots", given, allowed)
+    return tuple(int(episode) for episode in given)
 
 
 class Streams(NamedTuple):
@@ -292,6 +314,69 @@ class GymnasiumEnvironment:
 Environment = CompiledEnvironment | GymnasiumEnvironment
 
 
+def make_environment(env: str) -> gymnasium.Env[Any, Any]:
+    """Make an environment by its id, with the time limit it is registered with.
+
+    Raises
+    ------
+    ValueError
+        If Gymnasium does not know the id, or the module it names cannot be imported.
+
+    Examples
+    --------
+    >>> make_environment("nowhere:Foo-v0")
+    Traceback (most recent call last):
+    ValueError: env must be an id that Gymnasium knows, got 'nowhere:Foo-v0'
+    """
+    try:
+        return gymnasium.make(env, disable_env_checker=True)
+    except (gymnasium.error.Error, ImportError) as error:
+        raise ValueError(f"env must be an id that Gymnasium knows, got {env!r}") from error
+
+
+def check_fit(
+    policy: Policy, parameters: NDArray[np.float32], environment: Environment, name: str
+) -> None:
+    """Raise unless a policy takes the observations of an environment and puts out its actions.
+
+    Parameters
+    ----------
+    policy : Policy
+    parameters : float32 array of shape (P,)
+    environment : CompiledEnvironment or GymnasiumEnvironment
+    name : str
+        What the message calls the policy.
+
+    Raises
+    ------
+    ValueError
+        If the number of inputs, the kind or number of actions, or P is another.
+
+    Examples
+    --------
+    >>> policy = Policy(np.array([2, 5]), False, False, False, 1)
+    >>> check_fit(policy, np.zeros(15, np.float32), open_environment("MountainCar-v0"), "agent")
+    Traceback (most recent call last):
+    ValueError: agent must be a categorical policy of 3 actions, got a categorical policy of 5
+    """
+    inputs = environment.n_observations + policy.constant_feature
+    sizes = policy.sizes.tolist()
+    require(sizes[0] == inputs, name, sizes, f"a network of {inputs} inputs")
+    if environment.n_actions > 0:
+        allowed = f"a categorical policy of {environment.n_actions} actions"
+        fits = not policy.gaussian and sizes[-1] == environment.n_actions
+    else:
+        allowed = f"a Gaussian policy of {environment.action_dimensions} components"
+        fits = policy.gaussian and policy.action_width == environment.action_dimensions
+    if not fits:
+        kind = "Gaussian" if policy.gaussian else "categorical"
+        width = policy.action_width if policy.gaussian else sizes[-1]
+        raise ValueError(f"{name} must be {allowed}, got a {kind} policy of {width}")
+    count = networks.count_parameters(sizes) + policy.gaussian * policy.action_width
+    shape = np.shape(parameters)
+    require(shape == (count,), name, shape, f"a policy with parameters of shape ({count},)")
+
+
 def open_environment(env: EnvironmentLike) -> Environment:
     """Make an environment that plays whole episodes.
 
@@ -321,10 +406,7 @@ def open_environment(env: EnvironmentLike) -> Environment:
     if isinstance(env, str):
         if env in dynamics.TASKS:
             return CompiledEnvironment(dynamics.TASKS[env])
-        try:
-            return GymnasiumEnvironment(gymnasium.make(env, disable_env_checker=True), owned=True)
-        except gymnasium.error.Error as error:
-            raise ValueError(f"env must be an id that Gymnasium knows, got {env!r}") from error
+        return GymnasiumEnvironment(make_environment(env), owned=True)
     if isinstance(env, gymnasium.Env):
         return GymnasiumEnvironment(env, owned=False)
     made = env() if callable(env) else env

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from rl_core import networks
 from rl_core.compiled import compiled
 from rl_core.discretise import Binned, start_binned, step_binned
-from rl_core.episodes import EnvironmentLike, Trajectory, open_environment
+from rl_core.episodes import EnvironmentLike, Trajectory, check_fit, open_environment
 from rl_core.exploration import EPSILON_GREEDY, choose
 from rl_core.policies import Policy, is_integer, require
 from rl_core.reinforce import ReinforceConfig
@@ -31,6 +31,12 @@ SPAWN_KEY = (1_000,)
 
 COLD = np.float32(2.0**40)
 """1 / T of a greedy policy. A power of two, so that it rounds nothing."""
+
+COLUMNS = (
+    *("episode", "steps", "return", "terminated"),
+    *("limited_steps", "limited_return", "limited_terminated"),
+)
+"""The columns of a table of evaluation, besides the measures."""
 
 Measure = Callable[[NDArray[np.float32], NDArray[np.float32], NDArray[np.float64]], float]
 """Observations, actions and rewards of an episode to a number."""
@@ -58,6 +64,17 @@ def as_learned(config: ReinforceConfig, weights: Mapping[str, NDArray[np.float32
         Of the run that made the weights.
     weights : mapping of str to array
         Of one seed, as `rl_core.rollouts.weights_of` gives them.
+
+    Raises
+    ------
+    ValueError
+        As `rl_core.rollouts.policy_of`.
+
+    Examples
+    --------
+    >>> weights = {"layer0.weight": np.zeros((2, 3), np.float32)}
+    >>> as_learned(ReinforceConfig(hidden=()), weights).policy.sizes
+    array([2, 3])
     """
     return Agent(*policy_of(config, weights))
 
@@ -148,7 +165,8 @@ def evaluate(
         A time limit, at most `max_steps`, under which the same episodes are counted as well.
     measures : mapping of str to callable, optional
         Further columns: `measure(observations, actions, rewards)` of the episode, with arrays of
-        shape (T + 1, n_observations), (T, action_width) and (T,).
+        shape (T + 1, n_observations), (T, action_width) and (T,). Their names are not those of
+        the other columns.
 
     Returns
     -------
@@ -170,12 +188,13 @@ def evaluate(
     ([-50.0, -50.0], [False, False])
     """
     _check(seed, episodes, max_steps, limit)
+    require(isinstance(agent, Agent), "agent", agent, "an Agent")
+    measures = _checked_measures(measures)
     policy, parameters = agent
     environment_seed, rng = evaluation_streams(seed)
     environment = open_environment(env)
     try:
-        inputs = environment.n_observations + policy.constant_feature
-        require(policy.sizes[0] == inputs, "agent", policy.sizes, f"a network of {inputs} inputs")
+        check_fit(policy, parameters, environment, "agent")
         environment.seed(environment_seed)
         trajectory = Trajectory(environment.n_observations, policy.action_width)
         rows = []
@@ -184,7 +203,7 @@ def evaluate(
             _, actions, rewards = trajectory.first(steps)
             row = {"steps": steps, "return": rewards.sum(), "terminated": terminated}
             row["limited_return"] = rewards[: limit or max_steps].sum()
-            for name, measure in (measures or {}).items():
+            for name, measure in measures.items():
                 row[name] = measure(trajectory.observations[: steps + 1], actions, rewards)
             rows.append(row)
     finally:
@@ -208,7 +227,7 @@ def evaluate_table(
     world : Binned
         See `rl_core.discretise.binned`.
     Q : float64 array of shape `world.shape`
-        Action values. Of several largest ones, one is drawn.
+        Action values, without NaN. Of several largest ones, one is drawn.
     seed, episodes, max_steps, limit
         As for `evaluate`.
 
@@ -220,7 +239,7 @@ def evaluate_table(
     Raises
     ------
     ValueError
-        If an argument is out of range.
+        If an argument is out of range, or Q is no array of the world's shape or has a NaN.
 
     Examples
     --------
@@ -231,7 +250,13 @@ def evaluate_table(
     (9, False)
     """
     _check(seed, episodes, max_steps, limit)
+    require(isinstance(world, Binned), "world", world, "a Binned")
+    require(isinstance(Q, np.ndarray), "Q", Q, "an array of numbers")
     require(Q.shape == world.shape, "Q", Q.shape, f"of shape {world.shape}")
+    require(Q.dtype.kind in "fiu", "Q", Q.dtype, "an array of numbers")
+    unknown = int(np.isnan(Q).sum())
+    require(unknown == 0, "Q", f"{unknown} of them", "without NaN")
+    Q = Q.astype(np.float64)
     environment_seed, rng = evaluation_streams(seed)
     starts = np.random.default_rng(environment_seed)
     played = np.empty((episodes, 4))
@@ -272,6 +297,17 @@ def _play_table(
             steps += 1
         played[k, 0], played[k, 1] = steps, total
         played[k, 2], played[k, 3] = 1.0 if terminated else 0.0, limited
+
+
+def _checked_measures(measures: Mapping[str, Measure] | None) -> Mapping[str, Measure]:
+    """Return the measures if they are functions under names of their own."""
+    if measures is None:
+        return {}
+    valid = isinstance(measures, Mapping) and all(callable(one) for one in measures.values())
+    require(valid, "measures", measures, "a mapping of names to functions, or None")
+    taken = sorted(set(measures) & set(COLUMNS))
+    require(not taken, "measures", taken, f"under names other than {', '.join(COLUMNS)}")
+    return measures
 
 
 def _check(seed: int, episodes: int, max_steps: int, limit: int | None) -> None:

@@ -123,7 +123,8 @@ def run(
     Raises
     ------
     TypeError, ValueError
-        An argument is not as described.
+        An argument is not as described, or an arm's environment or configuration is none for its
+        algorithm (`Arm.check`); nothing has run then.
     ExceptionGroup
         Blocks ended with an exception; each is named with its arm and seeds. All others
         were finished and stored before.
@@ -154,6 +155,8 @@ def run(
     check_integer("block", block, least=1)
     if backend not in (allowed := sorted({*BACKENDS, *EXTERNAL_BACKENDS})):
         raise ValueError(f"backend is {backend!r}; allowed are {allowed}")
+    if not isinstance(store, Store | Path | str):
+        raise TypeError(f"store is {store!r}; allowed are a folder's path and a Store")
     store = Store(Path(store.path if isinstance(store, Store) else store).resolve())
     tasks = [task for arm in arms for task in _tasks(arm, seeds)]
     stored = {task: _read(store, task) for task in tasks}
@@ -176,6 +179,8 @@ def _checked_arms(arms: object) -> list[Arm]:
     repeated = sorted({name for name in names if names.count(name) > 1})
     if not arms or repeated:
         raise ValueError(f"arms has the names {names}; allowed is at least one, each name once")
+    for arm in arms:
+        arm.check()
     return arms
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from rl_core import dynamics
-from rl_core.discretise import Discretised, binned
+from rl_core.discretise import Binned, Discretised, binned
 from rl_core.policies import is_integer, require
 from rl_core.q_learning import QLearningConfig, q_learning
 from rl_core.run import Run
@@ -54,6 +54,25 @@ class GridConfig:
             raise TypeError(f"learning is {self.learning!r}; allowed is a QLearningConfig")
 
 
+def check_q_learning_on_grid(env: str, config: GridConfig) -> None:
+    """Raise what `q_learning_on_grid` would raise for a world and a configuration; run nothing.
+
+    `rl_core.experiments.run` calls it for every arm before it begins with any.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `config` is no GridConfig, the environment unknown, or bins or levels not for its spaces.
+
+    Examples
+    --------
+    >>> check_q_learning_on_grid("MountainCar-v0", GridConfig(bins=10))
+    """
+    world = _open(env, config)
+    if isinstance(world, Discretised):
+        world.close()
+
+
 def q_learning_on_grid(
     env: str,
     config: GridConfig,
@@ -90,11 +109,7 @@ def q_learning_on_grid(
     >>> q_learning_on_grid("MountainCar-v0", config, episodes=3, seeds=[0]).arrays["Q"].shape
     (1, 100, 3)
     """
-    require(isinstance(env, str), "env", env, "a Gymnasium id")
-    require(isinstance(config, GridConfig), "config", config, "a GridConfig")
-    compiled = env in dynamics.TASKS
-    make = binned if compiled else Discretised
-    world = make(env, config.bins, levels=config.levels)
+    world = _open(env, config)
     try:
         return q_learning(
             world,
@@ -107,3 +122,11 @@ def q_learning_on_grid(
     finally:
         if isinstance(world, Discretised):
             world.close()
+
+
+def _open(env: str, config: GridConfig) -> Binned | Discretised:
+    """Make the world seen through the grid: compiled if it can be."""
+    require(isinstance(env, str), "env", env, "a Gymnasium id")
+    require(isinstance(config, GridConfig), "config", config, "a GridConfig")
+    make = binned if env in dynamics.TASKS else Discretised
+    return make(env, config.bins, levels=config.levels)

@@ -113,6 +113,12 @@ def unpack(sizes: Sequence[int], parameters: NDArray[np.float32]) -> dict[str, N
 def pack(layers: Mapping[str, NDArray[np.float32]]) -> tuple[tuple[int, ...], NDArray[np.float32]]:
     """Undo `unpack` for one network: its sizes and parameters. Missing biases are zero.
 
+    Raises
+    ------
+    ValueError
+        If there is no `layer0.weight`, a weight has other than two axes, or a layer does not take
+        what the one before it puts out.
+
     Examples
     --------
     >>> sizes, parameters = pack({"layer0.weight": np.ones((2, 3), np.float32)})
@@ -128,6 +134,9 @@ def pack(layers: Mapping[str, NDArray[np.float32]]) -> tuple[tuple[int, ...], ND
             f"axes, got { ({name: np.shape(array) for name, array in layers.items()}) }"
         )
     sizes = (weights[0].shape[0], *(weight.shape[1] for weight in weights))
+    shapes = [weight.shape for weight in weights]
+    if shapes != list(pairwise(sizes)):
+        raise ValueError(f"layers must each take what the one before puts out, got {shapes}")
     parameters = np.zeros(count_parameters(sizes), np.float32)
     for name, view in unpack(sizes, parameters).items():
         if name in layers:

@@ -14,6 +14,7 @@ Sources: R. S. Sutton and A. G. Barto, Reinforcement Learning: An Introduction (
 """
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -45,8 +46,27 @@ def is_integer(value: object, least: int) -> bool:
 
 
 def is_number(value: object) -> bool:
-    """Tell whether a value is a finite number, not a bool."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    """Tell whether a value is a finite real number, Python's or numpy's, not a bool.
+
+    Examples
+    --------
+    >>> is_number(np.float32(0.9)), is_number(True), is_number("0.9"), is_number(math.inf)
+    (True, False, False, False)
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        return False
+    return math.isfinite(value)
+
+
+def is_one_of(value: object, words: Collection[str]) -> bool:
+    """Tell whether a value is one of some words; anything may be asked about.
+
+    Examples
+    --------
+    >>> is_one_of("none", ("centre", "none")), is_one_of(np.array(["centre", "none"]), ("none",))
+    (True, False)
+    """
+    return isinstance(value, str) and value in words
 
 
 @dataclass(frozen=True)
@@ -87,7 +107,8 @@ class Gaussian:
     constant_feature: bool = False
 
     def __post_init__(self) -> None:
-        require(self.mean in ("weights", "direct"), "mean", self.mean, "'weights' or 'direct'")
+        named = is_one_of(self.mean, ("weights", "direct"))
+        require(named, "mean", self.mean, "'weights' or 'direct'")
         valid = is_number(self.sigma) and self.sigma > 0
         require(valid, "sigma", self.sigma, "a finite number above 0")
         for name in ("learn_sigma", "constant_feature"):
@@ -296,6 +317,15 @@ def choose_action(
         Scratch space.
     action : float32 array of shape (action_width,)
         Overwritten. A Gaussian action is written as drawn, not clipped to any bounds.
+
+    Examples
+    --------
+    >>> policy = make_policy(Categorical(), (), 2, 3, 0)
+    >>> parameters, action = np.zeros(9, np.float32), np.empty(1, np.float32)
+    >>> units = np.empty(5, np.float32)
+    >>> choose_action(policy, parameters, np.ones(2, np.float32), np.array([0.5]), units, action)
+    >>> action
+    array([1.], dtype=float32)
     """
     _write_features(policy, observation, units)
     networks.forward_one(policy.sizes, parameters, units)
@@ -387,6 +417,21 @@ def likelihood_gradient(
         Scratch space.
     gradient : float32 array of shape (P,)
         Overwritten.
+
+    Examples
+    --------
+    With equal probabilities, the gradient by the output of action k is 1/2 - [k = a].
+
+    >>> policy = make_policy(Categorical(), (), 1, 2, 0)
+    >>> units, deltas = np.empty((2, 3, networks.padded(1)), np.float32)
+    >>> parameters, gradient = np.zeros(4, np.float32), np.empty(4, np.float32)
+    >>> state, action = np.ones((1, 1), np.float32), np.zeros((1, 1), np.float32)
+    >>> weight = np.ones(1, np.float32)
+    >>> likelihood_gradient(
+    ...     policy, parameters, state, action, weight, units, deltas, gradient
+    ... )
+    >>> gradient
+    array([-0.5,  0.5, -0.5,  0.5], dtype=float32)
     """
     n, n_padded = weights.size, networks.padded(weights.size)
     units[: policy.sizes[0], n:n_padded] = 0.0

@@ -17,6 +17,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from gymnasium.envs.registration import registry
 
 LIBRARIES = ("gymnasium", "numba", "numpy", "pandas", "torch")
@@ -47,7 +48,7 @@ def describe(value: object, name: str = "config") -> Any:
     ----------
     value : object
         Dataclasses, lists, tuples, dicts with string keys, str, int, float, bool and None, nested
-        at will. Infinities and NaN are written as text.
+        at will; numpy's scalars count as Python's. Infinities and NaN are written as text.
     name : str
         What an error calls `value`.
 
@@ -70,6 +71,8 @@ def describe(value: object, name: str = "config") -> Any:
             for field in dataclasses.fields(value)
         }
         return {"class": type(value).__qualname__, **fields}
+    if isinstance(value, np.generic):
+        value = value.item()
     if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
         return {key: describe(item, f"{name}[{key!r}]") for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -106,12 +109,23 @@ def environment_modules(env: str) -> list[str]:
     Gymnasium's own are named by its version. In Gymnasium, the id "module:Name-v0" means: import
     the module, which registers the environment.
 
+    Raises
+    ------
+    ValueError
+        If that module cannot be imported.
+
+    Examples
+    --------
     >>> environment_modules("CartPole-v1"), environment_modules("rl_core/Maze-v0")
     ([], ['rl_core.maze'])
     """
     module, _, name = env.rpartition(":")
     if module:
-        importlib.import_module(module)
+        try:
+            importlib.import_module(module)
+        except ImportError as error:
+            allowed = "an id whose module can be imported"
+            raise ValueError(f"env must be {allowed}, got {env!r}") from error
     entry = registry[name].entry_point if name in registry else None
     maker = entry.partition(":")[0] if isinstance(entry, str) else getattr(entry, "__module__", "")
     return [found for found in (module, maker) if found and found.split(".")[0] != "gymnasium"]

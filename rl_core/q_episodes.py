@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from rl_core import dynamics
 from rl_core.compiled import compiled
-from rl_core.episodes import EnvironmentLike, GymnasiumEnvironment
+from rl_core.episodes import EnvironmentLike, GymnasiumEnvironment, make_environment
 from rl_core.q_update import (
     DUE,
     NOT_A_NUMBER,
@@ -271,10 +271,7 @@ def open_world(env: EnvironmentLike) -> World:
     if isinstance(env, str):
         if env in dynamics.TASKS and dynamics.TASKS[env].n_actions > 0:
             return CompiledWorld(dynamics.TASKS[env])
-        try:
-            return GymnasiumWorld(gymnasium.make(env, disable_env_checker=True), owned=True)
-        except gymnasium.error.Error as error:
-            raise ValueError(f"env must be an id that Gymnasium knows, got {env!r}") from error
+        return GymnasiumWorld(make_environment(env), owned=True)
     if isinstance(env, gymnasium.Env):
         return GymnasiumWorld(env, owned=False)
     made = env() if callable(env) else env

@@ -9,6 +9,13 @@ the actions taken, weighted by what followed them:
 for minibatches B of the episode, over several epochs, with Adam in place of the plain step. The
 factor gamma^t of the textbook's update is left out, as in the report and in common practice.
 
+CartPole-v1 is learned through the plain loop with
+
+    ReinforceConfig(gamma=0.995, hidden=(64,), learning_rate=2e-3, epochs=1)
+
+in 1,000 episodes: these settings were chosen on seeds 1000 to 1014, of which 13 came to an average
+return of at least 450 over the last 50 episodes. A test holds most of seeds 0 to 9 to the same.
+
     for each seed:
         draw the initial weights
         for each episode:
@@ -39,6 +46,7 @@ from rl_core.episodes import (
     EnvironmentLike,
     Trajectory,
     checked_seeds,
+    checked_snapshots,
     open_environment,
     spawn_streams,
 )
@@ -48,6 +56,7 @@ from rl_core.policies import (
     Policy,
     is_integer,
     is_number,
+    is_one_of,
     likelihood_gradient,
     require,
 )
@@ -129,7 +138,7 @@ class ReinforceConfig:
             "learning_rate": (is_number(rate) and rate > 0, "a finite number above 0"),
             "batch_size": (is_integer(self.batch_size, 1), "a positive integer"),
             "epochs": (is_integer(self.epochs, 1), "a positive integer"),
-            "normalise": (self.normalise in forms, f"one of {forms}"),
+            "normalise": (is_one_of(self.normalise, forms), f"one of {forms}"),
             "learn_from_capped": (isinstance(self.learn_from_capped, bool), "a bool"),
         }
         for name in ("max_episode_steps", "max_env_steps"):
@@ -326,6 +335,28 @@ def _train(
     return trained
 
 
+def check_reinforce(env: EnvironmentLike, config: ReinforceConfig) -> None:
+    """Raise what `reinforce` would raise for an environment and a configuration; run nothing.
+
+    `rl_core.experiments.run` calls it for every arm before it begins with any.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If `config` is no ReinforceConfig, the environment unknown, or its spaces of another kind.
+
+    Examples
+    --------
+    >>> check_reinforce("MountainCar-v0", ReinforceConfig())
+    """
+    require(isinstance(config, ReinforceConfig), "config", config, "a ReinforceConfig")
+    environment = open_environment(env)
+    try:
+        _policy(config, environment)
+    finally:
+        environment.close()
+
+
 def reinforce(
     env: EnvironmentLike,
     config: ReinforceConfig,
@@ -383,9 +414,9 @@ def reinforce(
     seeds = checked_seeds(seeds)
     require(isinstance(config, ReinforceConfig), "config", config, "a ReinforceConfig")
     require(is_integer(episodes, 1), "episodes", episodes, "a positive integer")
-    for episode in snapshots:
-        valid = is_integer(episode, 0) and episode <= episodes
-        require(valid, "snapshots", snapshots, f"integers from 0 to {episodes}")
+    snapshots = checked_snapshots(snapshots, episodes)
+    allowed = "a function of episodes and steps, or None"
+    require(progress is None or callable(progress), "progress", progress, allowed)
     trained: list[_Seed] = []
     for seed in seeds:
         steps_before = sum(one.env_steps for one in trained)

@@ -8,7 +8,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from rl_core import networks
-from rl_core.episodes import EnvironmentLike, Trajectory, open_environment
+from rl_core.episodes import EnvironmentLike, Trajectory, check_fit, open_environment
 from rl_core.policies import Gaussian, Policy, is_integer, require
 from rl_core.reinforce import ReinforceConfig
 
@@ -26,7 +26,7 @@ def weights_of(
     arrays : mapping of str to array
         `Run.arrays`.
     position : int
-        Which seed, counted in the order asked for.
+        Which seed, counted from 0 in the order asked for.
     moment : str
         "" for the last weights, "initial/" for the first, "episode1000/" for a snapshot.
 
@@ -38,7 +38,7 @@ def weights_of(
     Raises
     ------
     ValueError
-        If the run has no such snapshot.
+        If the run has no such snapshot, or no such seed.
 
     Examples
     --------
@@ -48,14 +48,47 @@ def weights_of(
     """
     names = [name for name in arrays if name.rpartition("/")[0] == moment.rstrip("/")]
     require(bool(names), "moment", moment, f"one of which the arrays are: {sorted(arrays)}")
+    n_seeds = min(len(arrays[name]) for name in names)
+    valid = is_integer(position, 0) and position < n_seeds
+    require(valid, "position", position, f"an integer from 0 to {n_seeds - 1}")
     return {name.rpartition("/")[2]: arrays[name][position] for name in names}
 
 
 def policy_of(config: ReinforceConfig, weights: Weights) -> tuple[Policy, NDArray[np.float32]]:
-    """Put a policy and its parameter vector together again."""
+    """Put a policy and its parameter vector together again.
+
+    Parameters
+    ----------
+    config : ReinforceConfig
+        Of the run that made the weights.
+    weights : mapping of str to array
+        Of one seed, as `weights_of` gives them.
+
+    Returns
+    -------
+    policy : Policy
+    parameters : float32 array of shape (P,)
+
+    Raises
+    ------
+    ValueError
+        If `config` is no ReinforceConfig, the weights are not those of one network, or a Gaussian's
+        `log_sigma` is missing.
+
+    Examples
+    --------
+    >>> weights = {"layer0.weight": np.zeros((2, 3), np.float32)}
+    >>> policy, parameters = policy_of(ReinforceConfig(hidden=()), weights)
+    >>> policy.sizes, parameters.shape
+    (array([2, 3]), (9,))
+    """
+    require(isinstance(config, ReinforceConfig), "config", config, "a ReinforceConfig")
+    require(isinstance(weights, Mapping), "weights", weights, "a mapping of names to arrays")
     sizes, network = networks.pack(weights)
     if not isinstance(config.policy, Gaussian):
         return Policy(np.array(sizes), False, False, False, 1), network
+    given = "log_sigma" in weights
+    require(given, "weights", sorted(weights), "with 'log_sigma', since the policy is Gaussian")
     log_sigma = weights["log_sigma"]
     policy = Policy(
         np.array(sizes),
@@ -234,6 +267,11 @@ def rollout(
     -------
     Rollout
 
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument is out of range, the environment unknown, or the policy does not fit it.
+
     Examples
     --------
     >>> config = ReinforceConfig(hidden=())
@@ -243,17 +281,12 @@ def rollout(
     ((101, 2), False)
     """
     require(is_integer(max_steps, 1), "max_steps", max_steps, "a positive integer")
+    require(isinstance(rng, np.random.Generator), "rng", rng, "a numpy.random.Generator")
+    policy, parameters = policy_of(config, weights)
     environment_seed = int(rng.integers(2**32))
     environment = open_environment(env)
     try:
-        policy, parameters = policy_of(config, weights)
-        expected = environment.n_observations + policy.constant_feature
-        require(
-            policy.sizes[0] == expected,
-            "weights",
-            policy.sizes,
-            f"of a network with {expected} inputs",
-        )
+        check_fit(policy, parameters, environment, "weights")
         environment.seed(environment_seed)
         trajectory = Trajectory(environment.n_observations, policy.action_width)
         steps, terminated = environment.play(policy, parameters, rng, max_steps, trajectory)

@@ -132,8 +132,8 @@ def paired_difference_interval(
     Parameters
     ----------
     a, b : array, shape (seeds,) or (seeds, points)
-        Two arms with the same seeds in the same order. Finite or NaN: where seeds never get
-        there, `probability_of_improvement` still compares.
+        Two arms with the same seeds in the same order. Infinite where a seed never gets there: so
+        is its difference, and 0 where it does in neither arm. Of these only a median can be taken.
     statistic, rng, level, resamples
         As in `bootstrap_interval`.
 
@@ -147,13 +147,18 @@ def paired_difference_interval(
     >>> rng = np.random.default_rng(0)
     >>> paired_difference_interval([5.0, 7.0, 9.0], [4.0, 5.0, 6.0], np.mean, rng=rng).estimate
     2.0
+    >>> paired_difference_interval([np.inf, 7.0, np.inf], [4.0, 5.0, np.inf], rng=rng).estimate
+    2.0
     """
     a, b = _checked_values("a", a), _checked_values("b", b)
     if a.shape != b.shape:
         raise ValueError(f"a has shape {a.shape}, b has {b.shape}; allowed are equal shapes")
-    if np.isinf(a).any() or np.isinf(b).any():
-        raise ValueError("a or b is infinite for some seed; allowed are finite values and NaN")
-    return bootstrap_interval(a - b, statistic, rng=rng, level=level, resamples=resamples)
+    infinite = np.isinf(a).any() or np.isinf(b).any()
+    if infinite and statistic is not np.median:
+        raise ValueError("a or b is infinite for some seed; allowed is then only np.median")
+    with np.errstate(invalid="ignore"):
+        differences = np.where(np.isinf(a) & (a == b), 0.0, a - b)
+    return bootstrap_interval(differences, statistic, rng=rng, level=level, resamples=resamples)
 
 
 def probability_of_improvement(

@@ -12,11 +12,14 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from urllib.parse import urldefrag
 
+import pandas as pd
 import pytest
 from chromium import NoBrowserError, open_browser
 from playwright.sync_api import Browser, Page, Route
 
-SITE = Path(__file__).parent.parent / "_build" / "html"
+ROOT = Path(__file__).parent.parent
+SITE = ROOT / "_build" / "html"
+CLAIMS = ROOT / "book" / "data" / "claims.csv"
 PAGES = sorted(
     path.relative_to(SITE).as_posix()
     for path in SITE.rglob("*.html")
@@ -276,6 +279,44 @@ CONTRAST = """
 def test_text_stands_out_from_its_ground(view, path):
     """At least 4.5 to 1, the Web Content Accessibility Guidelines' level AA."""
     assert view.go(path).find(CONTRAST) == []
+
+
+def cells(page: Page, name: str) -> list[str]:
+    """A column of the table of claims, from top to bottom."""
+    return page.locator(f'table.claims td[data-label="{name}"]').all_inner_texts()
+
+
+def first_number(text: str) -> float:
+    """What a cell such as "1,234 [−∞, ∞]" begins with."""
+    return float(text.split()[0].replace(",", "").replace("−", "-").replace("∞", "inf"))
+
+
+def test_a_click_on_a_heading_sorts_the_claims(desk):
+    desk.go("book/intro.html")
+    buttons = desk.page.locator("table.claims th button")
+    as_judged = cells(desk.page, "id")
+    expected = pd.read_csv(CLAIMS, dtype=str)["id"].tolist()
+    assert sorted(as_judged) == sorted(expected)
+    for heading, key in (("measured", first_number), ("claim of 2018", str.casefold)):
+        button = buttons.get_by_text(heading, exact=True)
+        for backwards in (False, True):
+            button.click()
+            keys = [key(text) for text in cells(desk.page, heading)]
+            if key is first_number:
+                assert keys == sorted(keys, reverse=backwards)
+            assert keys[0] == (max if backwards else min)(keys)
+    button = buttons.get_by_text("id", exact=True)
+    button.click()
+    assert cells(desk.page, "id") == expected
+    assert desk.page.locator("table.claims th[aria-sort]").count() == 1
+    button.click()
+    assert cells(desk.page, "id") == expected[::-1]
+
+
+def test_the_caption_speaks_of_headings_where_there_are_some(view):
+    view.go("book/intro.html")
+    shown = [view.page.locator(f"table.claims {it}").is_visible() for it in ("thead", ".sorts")]
+    assert shown == [view.page.viewport_size["width"] > 700] * 2
 
 
 DARK = "() => matchMedia('(prefers-color-scheme: dark)').matches"

@@ -1,9 +1,21 @@
 """Verdicts follow from intervals alone."""
 
+import math
+
 import pandas as pd
 import pytest
 
-from rl_core.claims import COLUMNS, Claim, Criterion, Evidence, details, record, verdicts
+from rl_core.claims import (
+    COLUMNS,
+    Claim,
+    Criterion,
+    Evidence,
+    details,
+    record,
+    seeds_to_tell,
+    verdicts,
+    what_it_would_take,
+)
 
 FEW = Criterion("at most 10", at_most=10)
 MANY = Criterion("at least 1", at_least=1)
@@ -52,6 +64,11 @@ def test_above_does_not_include_its_bound(low, high, answer):
     assert criterion.answer(Evidence(low, low, high, seeds=30)) == answer
 
 
+def test_a_criterion_is_one_sentence():
+    with pytest.raises(ValueError, match=r"text must be without '; '.*got 'a; b'"):
+        Criterion("a; b")
+
+
 def test_every_criterion_needs_its_evidence():
     with pytest.raises(ValueError, match="claim 1a has 2 criteria, not 1"):
         claim(FEW, MANY).judge(Evidence.exact(1))
@@ -79,6 +96,32 @@ def test_the_table_gathers_the_chapters_in_order(tmp_path):
     assert details([first])["met"].tolist() == ["yes", "yes"]
     assert details([second])["measured"].tolist() == ["4 [3, 5]"]
     assert verdicts([first, second])["verdict"].tolist() == ["holds", "holds"]
+
+
+@pytest.mark.parametrize(
+    ("criterion", "evidence", "seeds"),
+    [
+        (FEW, Evidence(8, 6, 12, seeds=30), 70),
+        (FEW, Evidence(10, 6, 12, seeds=4), math.inf),  # the estimate is the bound
+        (FEW, Evidence(8, 6, math.inf, seeds=30), math.inf),
+        (FEW, Evidence.none(), math.inf),
+        (Criterion("above a half", above=0.5), Evidence(0.75, 0.5, 1, seeds=30), 30),
+        (Criterion("75 to 125", 75, 125), Evidence(120, 110, 130, seeds=30), 120),
+    ],
+)
+def test_seeds_that_it_would_take(criterion, evidence, seeds):
+    assert criterion.answer(evidence) == "open"
+    assert seeds_to_tell(criterion, evidence) == seeds
+
+
+def test_only_what_is_open_is_said_to_need_more_seeds():
+    finding = claim(FEW, MANY).judge(Evidence(10, 6, 12, seeds=4), Evidence(4, 3, 5, seeds=30))
+    assert what_it_would_take([finding]) == "1a, criterion 1: no number"
+
+
+def test_large_numbers_are_written_out():
+    finding = claim(MANY).judge(Evidence(1234, -math.inf, math.inf, seeds=30))
+    assert details([finding])["measured"].tolist() == ["1,234 [−∞, ∞]"]
 
 
 def test_no_claim_is_judged_twice(tmp_path):

@@ -555,6 +555,7 @@ def test_cart_pole_is_solved_through_the_plain_loop():
         ("hidden", [10]),
         ("biases", 1),
         ("optimiser", "sgd"),
+        ("optimiser", np.array(["adam", "sgd"])),
         ("learning_rate", 0.0),
         ("learning_rate", np.inf),
         ("batch_size", 0),
@@ -609,8 +610,12 @@ def test_an_impossible_shaping_is_refused(function):
         ("seeds", [1, 1]),
         ("seeds", [-1]),
         ("seeds", [True]),
+        ("seeds", 5),
+        ("seeds", None),
         ("episodes", 0),
         ("snapshots", (11,)),
+        ("snapshots", 5),
+        ("progress", 5),
         ("config", None),
     ],
 )
@@ -630,6 +635,8 @@ def test_environments_with_other_spaces_are_refused():
         dqn("FrozenLake-v1", SMALL, episodes=1, seeds=[0])
     with pytest.raises(ValueError, match="env must be an id that Gymnasium knows"):
         dqn("Pole-v7", SMALL, episodes=1, seeds=[0])
+    with pytest.raises(ValueError, match="env must be an id that Gymnasium knows"):
+        dqn("nowhere:Foo-v0", SMALL, episodes=1, seeds=[0])
     with pytest.raises(TypeError, match="env must be a Gymnasium id"):
         dqn(3, SMALL, episodes=1, seeds=[0])
 

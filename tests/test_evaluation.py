@@ -182,5 +182,49 @@ def test_bad_arguments():
             evaluate_table(world, np.zeros(world.shape), **arguments)
     with pytest.raises(ValueError, match="agent must be a network of 6 inputs"):
         evaluate("Acrobot-v1", agent, seed=0, episodes=1, max_steps=5)
-    with pytest.raises(ValueError, match=r"Q must be of shape \(25, 3\)"):
-        evaluate_table(world, np.zeros((24, 3)), seed=0, episodes=1, max_steps=5)
+    with pytest.raises(ValueError, match="agent must be an Agent, got None"):
+        evaluate("Acrobot-v1", None, seed=0, episodes=1, max_steps=5)
+
+
+GAUSSIAN = as_learned(
+    ReinforceConfig(hidden=(), policy=Gaussian(mean="direct")),
+    {"layer0.weight": np.zeros((2, 1), np.float32), "log_sigma": np.zeros(1, np.float32)},
+)
+
+
+@pytest.mark.parametrize(
+    ("env", "agent", "message"),
+    [
+        ("MountainCar-v0", uniform(2, 5), "a categorical policy of 3 actions, got .* of 5"),
+        ("MountainCar-v0", GAUSSIAN, "of 3 actions, got a Gaussian policy of 1"),
+        ("MountainCarContinuous-v0", uniform(2, 3), "a Gaussian policy of 1 components, got a cat"),
+        ("CartPole-v1", uniform(4, 3), "of 2 actions, got a categorical policy of 3"),
+        ("MountainCar-v0", uniform(2, 3)._replace(parameters=np.zeros(8, np.float32)), r"\(9,\)"),
+    ],
+)
+def test_an_agent_that_does_not_fit_its_environment_is_refused(env, agent, message):
+    with pytest.raises(ValueError, match=f"^agent must be .*{message}"):
+        evaluate(env, agent, seed=0, episodes=1, max_steps=5)
+
+
+@pytest.mark.parametrize(
+    ("Q", "message"),
+    [
+        (np.zeros((24, 3)), r"of shape \(25, 3\), got \(24, 3\)"),
+        ([[0.0] * 3] * 25, "an array of numbers"),
+        (np.full((25, 3), "a"), "an array of numbers"),
+        (np.where(np.arange(75) == 7, np.nan, 0).reshape(25, 3), "without NaN, got '1 of them'"),
+    ],
+)
+def test_a_table_of_something_else_is_refused(Q, message):
+    world = binned("MountainCar-v0", 5)
+    with pytest.raises(ValueError, match=f"^Q must be {message}"):
+        evaluate_table(world, Q, seed=0, episodes=1, max_steps=5)
+
+
+@pytest.mark.parametrize("measures", [{"steps": max}, {"limited_return": max}, {"a": 3}, [max]])
+def test_measures_do_not_take_the_place_of_a_column(measures):
+    with pytest.raises(ValueError, match=r"^measures must be "):
+        evaluate(
+            "MountainCar-v0", uniform(2, 3), seed=0, episodes=1, max_steps=5, measures=measures
+        )

@@ -62,10 +62,26 @@ def test_shaped_returns_are_those_that_dqn_learns_from():
 
 
 def test_the_gentler_the_driver_the_more_it_gets_and_the_longer_it_takes():
-    table = study.gentle((1.0, 0.6, 0.3))
+    """Down to where the wall on the left stops it: from there on it never arrives."""
+    drivers = study.gentle((0.15, 1.0, 0.6, 0.3, 0.18))
+    soft, lost = study.gentlest(drivers)
+    assert (soft["force"], lost["force"]) == (0.18, 0.15)
+    assert lost["reached"] == 0
+    table = drivers.sort_values("force", ascending=False)[:-1]
+    assert (table["reached"] == 1).all()
     assert table["steps"].is_monotonic_increasing
     assert table["return"].is_monotonic_increasing
     assert table["return"].iloc[-1] < 100
+
+
+def test_a_ratio_to_networks_draws_these_too():
+    rng = np.random.default_rng(0)
+    table, network = np.full(30, 150.0), np.tile([100.0, 200.0, 9_000.0], 10)
+    found = study.relative_steps(table, network, rng)
+    assert found.estimate == 1.0
+    assert found.low < 1.0 < found.high  # although all tables are alike
+    assert study.relative_steps(table, np.full(30, 9_000.0), rng).seeds == 0
+    assert study.relative_steps(table[:2], network[1:3], rng).estimate == 0.75
 
 
 def test_arms_are_paired_with_and_without_the_limit():

@@ -21,7 +21,9 @@ from toy_learner import ToyConfig, count_threads, learn
 
 import rl_core
 from rl_core import experiments
+from rl_core.dqn import DQNConfig, dqn
 from rl_core.experiments import Arm, DamagedResultWarning, run
+from rl_core.grid_learning import GridConfig, q_learning_on_grid
 from rl_core.policies import Gaussian
 from rl_core.reinforce import ReinforceConfig, reinforce
 from rl_core.store import ARRAYS, RECORD, TABLE, Store
@@ -104,15 +106,20 @@ def test_blocks_of_any_size_give_the_same_bits(tmp_path, block):
 @pytest.mark.parametrize("arm", [BOLD, ACROBOT, CAR])
 def test_a_seed_alone_gives_the_bits_it_has_among_thirty(tmp_path, arm):
     thirty = run([arm], seeds=range(30), store=tmp_path / "30", workers=1, block=30, **quiet)
+    stacked = thirty.arrays(arm.name)
     for seed in (2, 9):
         alone = run([arm], seeds=[seed], store=tmp_path / "1", workers=1, **quiet)
         table = thirty.table[thirty.table.seed == seed].reset_index(drop=True)
         pd.testing.assert_frame_equal(alone.table, table, check_exact=True)
-        stacked = thirty.arrays(arm.name)
         for name, array in alone.arrays(arm.name).items():
             assert array[0].tobytes() == stacked[name][seed].tobytes()
-    # and two seeds have nothing in common
-    assert len({array.tobytes() for array in stacked[name]}) == 30
+    # and two seeds have no weights in common
+    weights = {
+        name: array for name, array in stacked.items() if name.endswith(("weight", "weights"))
+    }
+    assert weights
+    for name, array in weights.items():
+        assert len({of_seed.tobytes() for of_seed in array}) == 30, name
 
 
 @pytest.mark.parametrize("backend", ["loky", "threading", "multiprocessing"])
@@ -443,6 +450,8 @@ def test_an_arm_refuses(monkeypatch, change, error, message):
         ({"seeds": [0.5]}, TypeError, r"seeds has 0\.5; allowed are integers"),
         ({"seeds": [True]}, TypeError, "seeds has True; allowed are integers"),
         ({"seeds": 30}, TypeError, "seeds is 30; allowed is an iterable"),
+        ({"store": 3}, TypeError, "store is 3; allowed are a folder's path and a Store"),
+        ({"store": None}, TypeError, "store is None; allowed"),
         ({"workers": 0}, ValueError, "workers has 0; allowed are integers from 1"),
         ({"workers": 1.5}, TypeError, r"workers has 1\.5; allowed"),
         ({"block": 0}, ValueError, "block has 0; allowed are integers from 1"),
@@ -453,6 +462,31 @@ def test_run_refuses(tmp_path, change, error, message):
     arguments = {"arms": [PLAIN], "seeds": [0], "store": tmp_path / "store"} | change
     with pytest.raises(error, match=message):
         run(arguments.pop("arms"), **arguments)
+    assert not (tmp_path / "store").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"env": "Pole-v7"}, "env must be an id that Gymnasium knows, got 'Pole-v7'"),
+        ({"env": "nowhere:Foo-v0"}, "env must be an id that Gymnasium knows, got 'nowhere:Foo-v0'"),
+        ({"env": "MountainCarContinuous-v0"}, "policy must be Gaussian"),
+        ({"config": ToyConfig()}, "config is ToyConfig.*; allowed is a ReinforceConfig"),
+        ({"algorithm": dqn}, "config is ReinforceConfig.*; allowed is a DQNConfig"),
+        (
+            {"algorithm": dqn, "config": DQNConfig(), "env": "MountainCarContinuous-v0"},
+            "env must have a Discrete action space",
+        ),
+        (
+            {"algorithm": q_learning_on_grid, "config": GridConfig(bins=(5, 5))},
+            r"bins must be a positive integer, or 6 of them, got \(5, 5\)",
+        ),
+    ],
+)
+def test_an_arm_that_cannot_run_stops_all_before_anything_runs(tmp_path, change, message):
+    wrong = dataclasses.replace(ACROBOT, name="wrong", **change)
+    with pytest.raises((TypeError, ValueError), match=f"^arm 'wrong': {message}"):
+        run([PLAIN, wrong], seeds=[0], store=tmp_path / "store", workers=1, **quiet)
     assert not (tmp_path / "store").exists()
 
 

@@ -67,6 +67,7 @@ def test_a_row_tells_its_interval_and_escapes_its_text():
     page = front_page.claims_table(FOUND)
     assert "<b>314</b> <small>[250, ∞]</small>" in page
     assert "<b>1</b></td>" in page  # exact: no interval
+    assert '<span class="sorts"> A click on a heading sorts.</span>' in page
     assert "c &lt;third&gt;" in page
     assert "<details><summary>and 1 more</summary><ul><li>the same again</li>" in page
 

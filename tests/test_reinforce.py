@@ -14,7 +14,7 @@ from gymnasium import spaces
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rl_core import networks, policies, reinforce
+from rl_core import networks, policies, provenance, reinforce
 from rl_core.dynamics import TASKS
 from rl_core.episodes import Trajectory, open_environment, spawn_streams
 from rl_core.policies import Categorical, Gaussian, make_policy
@@ -625,6 +625,7 @@ def test_cart_pole_is_learned_through_the_plain_loop():
         ("batch_size", 1.5),
         ("epochs", 0),
         ("normalise", "both"),
+        ("normalise", np.array(["none", "centre"])),
         ("max_episode_steps", 0),
         ("max_env_steps", -1),
         ("learn_from_capped", 1),
@@ -643,10 +644,15 @@ def test_a_setting_out_of_range_is_refused(field, value):
         ("seeds", [-1]),
         ("seeds", [0.5]),
         ("seeds", [True]),
+        ("seeds", 5),
+        ("seeds", None),
         ("episodes", 0),
         ("episodes", 2.5),
         ("snapshots", (11,)),
         ("snapshots", (-1,)),
+        ("snapshots", 5),
+        ("snapshots", (2 * n for n in range(9))),
+        ("progress", 5),
         ("config", None),
     ],
 )
@@ -668,9 +674,27 @@ def test_a_policy_over_other_actions_is_refused(env, policy):
         reinforce.reinforce(env, ReinforceConfig(policy=policy), episodes=1, seeds=[0])
 
 
-def test_an_unknown_environment_is_refused():
-    with pytest.raises(ValueError, match="env must be an id that Gymnasium knows"):
-        reinforce.reinforce("Pole-v7", ReinforceConfig(), episodes=1, seeds=[0])
+@pytest.mark.parametrize("env", ["Pole-v7", "nowhere:Foo-v0", "a b"])
+def test_an_unknown_environment_is_refused(env):
+    with pytest.raises(ValueError, match=f"env must be an id that Gymnasium knows, got {env!r}"):
+        reinforce.reinforce(env, ReinforceConfig(), episodes=1, seeds=[0])
+
+
+def test_numpys_numbers_are_numbers():
+    config = ReinforceConfig(
+        gamma=np.float32(0.5), learning_rate=np.float64(1e-3), batch_size=np.int64(7)
+    )
+    plain = ReinforceConfig(gamma=0.5, learning_rate=1e-3, batch_size=7)
+    runs = [reinforce.reinforce("Acrobot-v1", c, episodes=1, seeds=[0]) for c in (config, plain)]
+    assert_same(*runs)
+    assert provenance.describe(config) == provenance.describe(plain)
+
+
+def test_a_generator_of_snapshots_is_not_used_up():
+    config = ReinforceConfig(max_episode_steps=20)
+    every = (n for n in (1, 2))
+    run = reinforce.reinforce("Acrobot-v1", config, episodes=2, seeds=[0, 1], snapshots=every)
+    assert {"episode1/layer0.weight", "episode2/layer0.weight"} <= set(run.arrays)
 
 
 def test_a_config_is_plain_data():

@@ -132,6 +132,14 @@ def test_a_snapshot_that_was_not_kept_is_refused(acrobot):
         rollouts.weights_of(acrobot[1].arrays, 0, "episode7/")
 
 
+@pytest.mark.parametrize("position", [99, 2, -1, None, 0.5])
+def test_a_seed_that_was_not_run_is_refused(acrobot, position):
+    with pytest.raises(
+        ValueError, match=f"position must be an integer from 0 to 1, got {position}"
+    ):
+        rollouts.weights_of(acrobot[1].arrays, position)
+
+
 def test_the_view_of_another_policy_is_refused(acrobot):
     config, run = acrobot
     weights = rollouts.weights_of(run.arrays, 0)
@@ -145,7 +153,13 @@ def test_weights_for_another_environment_are_refused(acrobot):
     config, run = acrobot
     weights = rollouts.weights_of(run.arrays, 0)
     rng = np.random.default_rng(0)
-    with pytest.raises(ValueError, match="weights must be of a network with 2 inputs"):
+    with pytest.raises(ValueError, match="weights must be a network of 2 inputs"):
         rollouts.rollout("MountainCar-v0", config, weights, rng, 10)
+    with pytest.raises(ValueError, match=r"rng must be a numpy\.random.Generator, got None"):
+        rollouts.rollout("Acrobot-v1", config, weights, None, 10)
+    with pytest.raises(ValueError, match="config must be a ReinforceConfig, got None"):
+        rollouts.rollout("Acrobot-v1", None, weights, rng, 10)
+    with pytest.raises(ValueError, match="weights must be with 'log_sigma'"):
+        rollouts.rollout("MountainCarContinuous-v0", CONTINUOUS, weights, rng, 10)
     with pytest.raises(ValueError, match="max_steps must be a positive integer"):
         rollouts.rollout("Acrobot-v1", config, weights, rng, 0)

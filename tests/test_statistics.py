@@ -218,8 +218,15 @@ def test_pairing_removes_what_the_seeds_share():
 def test_differences_refuse_what_cannot_be_subtracted():
     with pytest.raises(ValueError, match=r"a has shape \(2,\), b has \(3,\)"):
         paired_difference_interval([1.0, 2.0], [1.0, 2.0, 3.0], rng=generator())
-    with pytest.raises(ValueError, match="infinite"):
-        paired_difference_interval([1.0, np.inf], [1.0, np.inf], rng=generator())
+    with pytest.raises(ValueError, match=r"infinite .* only np\.median"):
+        paired_difference_interval([1.0, np.inf], [1.0, np.inf], np.mean, rng=generator())
+
+
+def test_a_seed_that_never_gets_there_has_an_infinite_difference_unless_neither_does():
+    a, b = [np.inf, np.inf, 5.0, 7.0, 9.0], [np.inf, 3.0, np.inf, 6.0, 6.0]
+    interval = paired_difference_interval(a, b, rng=generator())
+    assert interval == bootstrap_interval([0, np.inf, -np.inf, 1, 3], rng=generator())
+    assert interval == (1, -np.inf, np.inf)
 
 
 def test_probability_of_improvement_is_the_mann_whitney_statistic():

@@ -1,9 +1,15 @@
 // Tables of class "sortable": a click on a heading sorts the rows by it, a second one backwards.
 document.addEventListener("DOMContentLoaded", () => {
-  const number = (text) => Number.parseFloat(text.replaceAll(",", "").replace("∞", "Infinity"));
+  // A number only if the whole first word is one: "3a" is a name. The interval behind it is ignored.
+  const number = (text) => {
+    const [word] = text.replace(/^[-−]/, "-").split(/\s/, 1);
+    if (/^-?∞$/.test(word)) return word === "∞" ? Infinity : -Infinity;
+    return /^-?[\d.,]+(e-?\d+)?$/.test(word) ? Number(word.replaceAll(",", "")) : Number.NaN;
+  };
   const compare = (a, b) => {
     const [x, y] = [number(a), number(b)];
-    return Number.isNaN(x) || Number.isNaN(y) ? a.localeCompare(b, "en", { numeric: true }) : x - y;
+    if (Number.isNaN(x) || Number.isNaN(y)) return a.localeCompare(b, "en", { numeric: true });
+    return x === y ? 0 : x - y;
   };
   for (const table of document.querySelectorAll("table.sortable")) {
     const headings = [...table.tHead.rows[0].cells];
