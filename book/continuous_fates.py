@@ -24,7 +24,8 @@ FATES = (
 def fates(curves: Curves, arm: str, log_sigma: np.ndarray) -> list[str]:
     """What became of each seed.
 
-    A seed that ended in an episode of more than 100,000 steps is stuck. What its policy does there
+    A seed that its budget ended while it still got out is judged like those that came to the last
+    episode. Another that ended in an episode that was stopped is stuck. What its policy does there
     follows from the cost: a step costs 0.1 (mu^2 + sigma^2) on average. It idles if the root mean
     square of mu is at most half the engine's force, and presses if it is more.
 
@@ -36,13 +37,14 @@ def fates(curves: Curves, arm: str, log_sigma: np.ndarray) -> list[str]:
         As the run ended with it.
     """
     found = []
-    for position, (seed, good) in enumerate(zip(SEEDS, curves.learned(arm), strict=True)):
+    outcomes = zip(SEEDS, curves.learned(arm), curves.out_of_budget(arm), strict=True)
+    for position, (seed, good, cut) in enumerate(outcomes):
         rows = curves.rows[arm]
         rows = rows[rows["seed"] == seed]
         stopped = rows[~rows["terminated"] & (rows["steps"] > EXTREME)]
         if good:
             found.append("learned")
-        elif stopped.empty or rows["terminated"].iloc[-1]:
+        elif cut or stopped.empty or rows["terminated"].iloc[-1]:
             found.append("still slow")
         elif not rows["terminated"].any():
             found.append("never out")

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from rl_core.claims import Claim, Criterion, Evidence
 from rl_core.policies import Gaussian
 from rl_core.reinforce import ReinforceConfig
 from rl_core.rollouts import mean_actions
@@ -56,13 +57,72 @@ def test_fates_by_hand():
     assert tuple(what_became.fates(curves, "as reported", log_sigma)) == what_became.FATES
 
 
-def test_a_good_seed_stopped_by_its_budget_is_slow_not_stuck():
+CUT = [*[True] * 400, False]
+
+
+@pytest.mark.parametrize(
+    ("steps", "terminated", "fate"),
+    [
+        ([*[200] * 400, 50], CUT, "learned"),
+        ([500_000, *[200] * 400, 50], [False, *CUT], "learned"),  # it recovered
+        ([*[900] * 400, 50], CUT, "still slow"),
+        ([500_000, *[900] * 400, 50], [False, *CUT], "still slow"),
+        ([*[200] * 90, 50], CUT[-91:], "still slow"),  # fewer than the 100 that it is judged by
+        ([*[200] * 400, 500_000, 50], [*CUT, False], "out, then idle"),  # stuck, then cut
+        ([*[200] * 400, 300_000], CUT, "out, then idle"),  # stuck in the episode that is cut
+    ],
+)
+def test_a_seed_cut_by_its_budget_is_judged_by_what_it_finished(steps, terminated, fate):
     rows = made_up("as reported")
-    rows = rows[rows["seed"] > 0]
-    first = seed_rows("as reported", 0, [*[200] * 400, 50], [*[True] * 400, False])
-    curves = curves_of(first, rows)
+    first = seed_rows("as reported", 0, steps, terminated)
+    curves = curves_of(first, rows[rows["seed"] > 0])
     found = what_became.fates(curves, "as reported", np.full((5, 1), np.log(SIGMA)))
-    assert found[0] == "still slow"
+    assert found[0] == fate
+    judged = fate != "out, then idle"
+    assert curves.learned("as reported")[0] == (fate == "learned")
+    assert curves.out_of_budget("as reported").tolist() == [judged, *[False] * 4]
+    assert np.isfinite(curves.at("as reported")[0]) == judged
+    assert np.isfinite(curves.final_return("as reported")[0]) == judged
+
+
+def test_a_seed_cut_by_its_budget_keeps_its_last_measures():
+    steps = np.arange(1_000, 550, -1)
+    first = seed_rows("as reported", 0, [*steps, 3], [*[True] * len(steps), False])
+    rows = made_up("as reported")
+    curves = curves_of(first, rows[rows["seed"] > 0])
+    last = np.median(steps[-100:])
+    assert curves.at("as reported")[0] == curves.at("as reported", 500)[0] == last
+    assert curves.at("as reported", 200)[0] == np.median(steps[100:200])
+    np.testing.assert_array_equal(curves.last("as reported", 100, 200)[0], steps[100:200])
+    np.testing.assert_array_equal(curves.last("as reported", 100)[0], steps[-100:])
+    assert not curves.learned("as reported", 500)[0]
+
+
+def criterion_finding(criterion, *interval, seeds=30):
+    claim = Claim("1a", "1.1", "Something is so.", (criterion,), "Figure 1")
+    return claim.judge(Evidence(*interval, seeds=seeds))
+
+
+@pytest.mark.parametrize(
+    ("criterion", "interval", "answer"),
+    [
+        (Criterion("above a half", above=0.5), (0.625, 0.375, 0.875), "1a, criterion 1: 120"),
+        (Criterion("an eighth", at_least=0.125), (0.25, 0.0, 0.5), "1a, criterion 1: 120"),
+        (Criterion("at most", at_most=0.25), (0.125, 0.0, 0.5), "1a, criterion 1: 120"),
+        (Criterion("both", 60, 100), (75, 50, 110), "1a, criterion 1: 120"),  # not the 50 of 100
+        (Criterion("the bound", above=0.5), (0.5, 0.4, 0.6), "1a, criterion 1: no number"),
+        (Criterion("no end", at_most=9), (np.inf, 5, np.inf), "1a, criterion 1: no number"),
+        (Criterion("settled", above=0.5), (0.7, 0.6, 0.8), "none is open"),
+    ],
+)
+def test_what_it_would_take_by_hand(criterion, interval, answer):
+    """30 seeds, and a half width twice the distance to the bound: 30 times 2 squared."""
+    assert study.what_it_would_take([criterion_finding(criterion, *interval)]) == answer
+
+
+def test_no_seeds_give_no_number():
+    nothing = criterion_finding(Criterion("above a half", above=0.5), 0.5, 0.0, 1.0, seeds=0)
+    assert study.what_it_would_take([nothing]) == "1a, criterion 1: no number"
 
 
 def test_measures_by_hand():
