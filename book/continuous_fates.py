@@ -49,10 +49,33 @@ def fates(curves: Curves, arm: str, log_sigma: np.ndarray) -> list[str]:
         elif not rows["terminated"].any():
             found.append("never out")
         else:
-            last, sigma = stopped.iloc[-1], np.exp(float(log_sigma[position, 0]))
-            push = -10 * last["return"] / last["steps"] - sigma**2
-            found.append("out, then idle" if push <= 0.5**2 else "out, then pressing")
+            force = _mean_force(stopped.iloc[-1], log_sigma[position, 0])
+            found.append("out, then idle" if force <= 0.5 else "out, then pressing")
     return found
+
+
+def _mean_force(episode: pd.Series, log_sigma: float) -> float:
+    """Root mean square of mu in an episode that did not reach the flag."""
+    square = -10 * episode["return"] / episode["steps"] - np.exp(2 * float(log_sigma))
+    return float(np.sqrt(max(square, 0.0)))
+
+
+def pressing_forces(curves: Curves, arm: str, log_sigma: np.ndarray) -> np.ndarray:
+    """Root mean square of mu of each seed that ended pressing, in its last long episode.
+
+    Parameters
+    ----------
+    curves, arm, log_sigma
+        As for `fates`.
+    """
+    found = []
+    for position, fate in enumerate(fates(curves, arm, log_sigma)):
+        rows = curves.rows[arm]
+        rows = rows[(rows["seed"] == SEEDS[position]) & ~rows["terminated"]]
+        if fate == "out, then pressing":
+            long = rows[rows["steps"] > EXTREME].iloc[-1]
+            found.append(_mean_force(long, log_sigma[position, 0]))
+    return np.array(found)
 
 
 def fate_table(curves: Curves, results: Results) -> pd.DataFrame:

@@ -42,6 +42,7 @@ def made_up(arm, level=200):
 @pytest.fixture(autouse=True)
 def short(monkeypatch):
     monkeypatch.setattr(study, "EPISODES", EPISODES)
+    monkeypatch.setattr(drawings, "EPISODES", EPISODES)
     monkeypatch.setattr(study, "SNAPSHOTS", (100,))
     for module in (study, what_became, drawings):
         monkeypatch.setattr(module, "SEEDS", range(5))
@@ -55,6 +56,12 @@ def test_fates_by_hand():
     curves = curves_of(made_up("as reported"))
     log_sigma = np.full((5, 1), np.log(SIGMA))
     assert tuple(what_became.fates(curves, "as reported", log_sigma)) == what_became.FATES
+
+
+def test_the_force_of_pressing_seeds_by_hand():
+    curves = curves_of(made_up("as reported"))
+    log_sigma = np.full((5, 1), np.log(SIGMA))
+    assert what_became.pressing_forces(curves, "as reported", log_sigma) == pytest.approx([3.0])
 
 
 CUT = [*[True] * 400, False]
@@ -168,6 +175,10 @@ def test_without_a_seed_that_learned_nothing_is_claimed():
     none = table[(table["arm"] == "sigma 1") & (table["measure"] == "steps")].iloc[0]
     assert np.isinf([none["low"], none["high"]]).all()
     assert len(drawings.tradeoff(table).axes) == 6
+    original = pd.DataFrame({"episode": [1, 2], "low": [9.0, 8.0], "high": [9.5, 8.5]})
+    arms = {"as reported": "two", "three features": "three"}
+    assert len(drawings.learning_curves(curves, arms, original).axes) == 2
+    assert set(drawings.curve_data(curves, list(arms))["arm"]) == set(arms)
 
 
 def test_arms_are_the_reports_with_one_thing_changed():
