@@ -50,8 +50,8 @@ REPORTED = {"Acrobot": 80, "MountainCar": 140}  # steps after 20 episodes
 SECONDS = {"Acrobot": 3, "MountainCar": 5}
 RIVALS = ("terminal flag", "exploration", "long memory", "biases")
 NOT_MEMORY = tuple(rival for rival in RIVALS if rival != "long memory")
-NO_REPLAY_MENDED = "original, the others mended, no replay"
-"""The arm that tells what replay does once nothing else is in the way; it came after 3l's data."""
+NO_REPLAY_MENDED = "original, all mended, no replay"
+"""What replay does once the other causes are mended: an arm that was added after 3l's data."""
 
 
 def reported(name: str) -> DQNConfig:
