@@ -102,7 +102,8 @@ def _row(name: str) -> dict:
         "ratio": round(rival / mine, 1),
         "unit": "microseconds a step",
         "note": "Stable-Baselines3 DQN, one seed; ours: 30 seeds, a seed's share; one core; "
-        f"{STEPS:,} steps a seed, all with an update; widths 10-20, Adam; theirs clips gradients and has the Huber loss",
+        f"{STEPS:,} steps a seed, all with an update; widths 10-20, Adam; theirs clips gradients "
+        "and has the Huber loss",
     }
 
 

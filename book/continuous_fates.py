@@ -24,7 +24,8 @@ FATES = (
 def fates(curves: Curves, arm: str, log_sigma: np.ndarray) -> list[str]:
     """What became of each seed.
 
-    A seed that ended in an episode of more than 100,000 steps is stuck. What its policy does there
+    A seed that its budget ended while it still got out is judged like those that came to the last
+    episode. Another that ended in an episode that was stopped is stuck. What its policy does there
     follows from the cost: a step costs 0.1 (mu^2 + sigma^2) on average. It idles if the root mean
     square of mu is at most half the engine's force, and presses if it is more.
 
@@ -36,21 +37,45 @@ def fates(curves: Curves, arm: str, log_sigma: np.ndarray) -> list[str]:
         As the run ended with it.
     """
     found = []
-    for position, (seed, good) in enumerate(zip(SEEDS, curves.learned(arm), strict=True)):
+    outcomes = zip(SEEDS, curves.learned(arm), curves.out_of_budget(arm), strict=True)
+    for position, (seed, good, cut) in enumerate(outcomes):
         rows = curves.rows[arm]
         rows = rows[rows["seed"] == seed]
         stopped = rows[~rows["terminated"] & (rows["steps"] > EXTREME)]
         if good:
             found.append("learned")
-        elif stopped.empty or rows["terminated"].iloc[-1]:
+        elif cut or stopped.empty or rows["terminated"].iloc[-1]:
             found.append("still slow")
         elif not rows["terminated"].any():
             found.append("never out")
         else:
-            last, sigma = stopped.iloc[-1], np.exp(float(log_sigma[position, 0]))
-            push = -10 * last["return"] / last["steps"] - sigma**2
-            found.append("out, then idle" if push <= 0.5**2 else "out, then pressing")
+            force = _mean_force(stopped.iloc[-1], log_sigma[position, 0])
+            found.append("out, then idle" if force <= 0.5 else "out, then pressing")
     return found
+
+
+def _mean_force(episode: pd.Series, log_sigma: float) -> float:
+    """Root mean square of mu in an episode that did not reach the flag."""
+    square = -10 * episode["return"] / episode["steps"] - np.exp(2 * float(log_sigma))
+    return float(np.sqrt(max(square, 0.0)))
+
+
+def pressing_forces(curves: Curves, arm: str, log_sigma: np.ndarray) -> np.ndarray:
+    """Root mean square of mu of each seed that ended pressing, in its last long episode.
+
+    Parameters
+    ----------
+    curves, arm, log_sigma
+        As for `fates`.
+    """
+    found = []
+    for position, fate in enumerate(fates(curves, arm, log_sigma)):
+        rows = curves.rows[arm]
+        rows = rows[(rows["seed"] == SEEDS[position]) & ~rows["terminated"]]
+        if fate == "out, then pressing":
+            long = rows[rows["steps"] > EXTREME].iloc[-1]
+            found.append(_mean_force(long, log_sigma[position, 0]))
+    return np.array(found)
 
 
 def fate_table(curves: Curves, results: Results) -> pd.DataFrame:

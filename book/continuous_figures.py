@@ -49,7 +49,10 @@ def _middle(axes: Axes, x: np.ndarray, seeds: np.ndarray, text: str, colour: str
 
 
 def curve_data(curves: Curves, arms: Sequence[str]) -> pd.DataFrame:
-    """What the curves are drawn from: each seed's median of the last 100 episodes, every tenth."""
+    """What the curves are drawn from: each seed's median of the last 100 episodes, every tenth.
+
+    A seed that its budget cut while it still got out keeps its last value, as in the medians drawn.
+    """
     tables = []
     for arm in arms:
         good = dict(zip(SEEDS, curves.learned(arm), strict=True))
@@ -61,33 +64,50 @@ def curve_data(curves: Curves, arms: Sequence[str]) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def learning_curve(curves: Curves, arm: str, original: pd.DataFrame) -> Figure:
-    """Steps an episode of every seed, where each stopped, and the curve of 2018."""
-    figure, axes = plt.subplots(figsize=(6.4, 4.6))
-    drawn = (original["episode"], original["low"], original["high"])
-    name = "2018 original, one run"
-    axes.fill_between(*drawn, color="#c9b458", alpha=0.75, lw=0, label=name)
+def learning_curves(curves: Curves, arms: Mapping[str, str], original: pd.DataFrame) -> Figure:
+    """A panel an arm: steps an episode of every seed, where each stopped, and the curve of 2018.
+
+    Parameters
+    ----------
+    curves : Curves
+    arms : mapping of str to str
+        Arms and the titles of their panels.
+    original : pandas.DataFrame
+        `episode, low, high` of the published curve.
+    """
+    figure, panels = plt.subplots(
+        *(len(arms), 1), figsize=(6.4, 4.2 * len(arms)), sharex=True, sharey=True, squeeze=False
+    )
+    for axes, (arm, title) in zip(panels[:, 0], arms.items(), strict=True):
+        drawn = (original["episode"], original["low"], original["high"])
+        name = "2018 original, one run"
+        axes.fill_between(*drawn, color="#c9b458", alpha=0.75, lw=0, label=name)
+        _every_seed(axes, curves, arm)
+        axes.axhline(200, color=GREY, lw=0.8, ls="--")
+        axes.text(EPISODES, 195, "200, the report's number", ha="right", va="top", fontsize=8)
+        axes.set_yscale("log")
+        label(axes, x="episode", y="steps to the goal (log scale)", title=title)
+        axes.legend(fontsize=8, loc="upper right")
+    plt.close(figure)
+    return figure
+
+
+def _every_seed(axes: Axes, curves: Curves, arm: str) -> None:
+    """A line a seed with a cross where its budget was used up, and the median of the good ones."""
     x = np.arange(EVERY, EPISODES + 1, EVERY)
     good, smooth = curves.learned(arm), curves.smooth[arm]
-    for steps, learned in zip(smooth, good, strict=True):
+    for steps, learned, end in zip(smooth, good, curves.ends[arm], strict=True):
         style = {"color": GREY, "ls": "-"} if learned else {"color": BLACK, "ls": ":"}
-        axes.plot(x, steps[x - 1], lw=0.6, **style)
-        last = np.flatnonzero(np.isfinite(steps))[-1]
+        axes.plot(x[x <= end], steps[x[x <= end] - 1], lw=0.6, **style)
+        last = np.flatnonzero(np.isfinite(steps[:end]))[-1]
         if last + 1 < EPISODES:
             axes.plot(last + 1, steps[last], "x", color=VERMILLION, ms=6, clip_on=False)
     axes.plot([], [], color=GREY, ls="-", lw=0.8, label=f"{good.sum()} seeds that learned")
-    missed = f"{(~good).sum()} that did not (×: budget used up)"
-    axes.plot([], [], color=BLACK, ls=":", lw=0.8, marker="x", mec=VERMILLION, label=missed)
+    axes.plot([], [], color=BLACK, ls=":", lw=0.8, label=f"{(~good).sum()} that did not")
+    axes.plot([], [], "x", color=VERMILLION, ms=6, label="budget used up")
     if good.any():
         text = "median of those that learned, 95% interval"
         _middle(axes, x, smooth[good][:, x - 1], text, BLUE, "-")
-    axes.axhline(200, color=GREY, lw=0.8, ls="--")
-    axes.text(EPISODES, 195, "200, the report's number", ha="right", va="top", fontsize=8)
-    axes.set_yscale("log")
-    label(axes, x="episode", y="steps to the goal (log scale)")
-    axes.legend(fontsize=9, loc="upper right")
-    plt.close(figure)
-    return figure
 
 
 def variants(curves: Curves, names: Mapping[str, str]) -> Figure:

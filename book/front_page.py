@@ -195,10 +195,13 @@ def _spoken(table: pd.DataFrame) -> str:
 def curves(path: Path) -> pd.DataFrame:
     """Read a figure's data as one column a seed, with the episode as index.
 
-    It has either columns `episode, seed_0, seed_1, ...` or rows `episode, seed, steps`. A seed that
-    stopped before the end needs for ever from there on.
+    It has either columns `episode, seed_0, seed_1, ...` or rows `episode, seed, steps`. Of several
+    arms the first is taken, which is the report's. A seed that stopped before the end needs for
+    ever from there on.
     """
     table = pd.read_csv(path)
+    if "arm" in table:
+        table = table[table["arm"] == table["arm"].iloc[0]]
     if "seed" in table:
         return table.pivot(index="episode", columns="seed", values="steps").fillna(np.inf)
     return table.set_index("episode").filter(like="seed_")

@@ -80,11 +80,13 @@ class DQNConfig:
     copy_every : int
         Updates between two copies to the fixed network. 1: no fixed target.
     epsilon : float, Decay or HalfWay
-        Probability of a random action (the report's epsilon is 1 minus it).
+        Probability that a run of one random action begins, where none is going on (the report's
+        epsilon is 1 minus it).
     persistence : int
-        Steps for which a random action is kept, at most to the end of the episode. 1: the usual
-        epsilon-greedy (W. Dabney, G. Ostrovski and A. Barreto 2021, Temporally-extended
-        epsilon-greedy exploration).
+        Steps p of such a run, at most to the end of the episode. 1: the usual epsilon-greedy, and
+        epsilon the share of random steps. Else that share is larger, p epsilon / (p epsilon + 1 -
+        epsilon) (W. Dabney, G. Ostrovski and A. Barreto 2021, Temporally-extended epsilon-greedy
+        exploration).
     shaping : Shaping or None
         What is learned from in place of the environment's reward. None: that reward.
     bootstrap_through_end : bool

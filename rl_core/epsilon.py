@@ -103,7 +103,21 @@ def _check_ends(start: float, end: float) -> None:
 
 
 def initial(epsilon: Epsilon) -> NDArray[np.float64]:
-    """Return the state in which a schedule begins: `VALUE` is epsilon itself."""
+    """Return the state in which a schedule begins: `VALUE` is epsilon itself.
+
+    Parameters
+    ----------
+    epsilon : float, Decay or HalfWay
+
+    Returns
+    -------
+    float64 array of shape (6,)
+
+    Examples
+    --------
+    >>> initial(0.1)[VALUE]
+    np.float64(0.1)
+    """
     if isinstance(epsilon, Decay):
         entries = (epsilon.start, epsilon.start, epsilon.end, epsilon.steps, 0.0, epsilon.start)
     elif isinstance(epsilon, HalfWay):
@@ -115,7 +129,22 @@ def initial(epsilon: Epsilon) -> NDArray[np.float64]:
 
 @compiled
 def after_step(state: NDArray[np.float64], t: int) -> None:
-    """Tell a schedule that t environment steps are over."""
+    """Tell a schedule that t environment steps are over: `Decay` goes on.
+
+    Parameters
+    ----------
+    state : float64 array of shape (6,)
+        Of `initial`; changed in place.
+    t : int
+        Steps of the seed so far.
+
+    Examples
+    --------
+    >>> state = initial(Decay(1.0, 0.0, steps=4))
+    >>> after_step(state, 3)
+    >>> state[VALUE]
+    np.float64(0.25)
+    """
     if state[STEPS] > 0.0:
         share = min(1.0, t / state[STEPS])
         state[VALUE] = state[START] + (state[END] - state[START]) * share
@@ -123,12 +152,39 @@ def after_step(state: NDArray[np.float64], t: int) -> None:
 
 @compiled
 def after_goal(state: NDArray[np.float64]) -> None:
-    """Tell a schedule that an episode has reached its end by itself."""
+    """Tell a schedule that an episode has reached its end by itself: `HalfWay` goes on.
+
+    Parameters
+    ----------
+    state : float64 array of shape (6,)
+        Of `initial`; changed in place.
+
+    Examples
+    --------
+    >>> state = initial(HalfWay(1.0, 0.0))
+    >>> after_goal(state)
+    >>> state[VALUE]
+    np.float64(0.5)
+    """
     state[VALUE] += state[SHARE] * (state[END] - state[VALUE])
     state[AIM] = state[VALUE] + state[SHARE] * (state[END] - state[VALUE])
 
 
 @compiled
 def after_copy(state: NDArray[np.float64]) -> None:
-    """Tell a schedule that the target network was copied."""
+    """Tell a schedule that the target network was copied: `HalfWay` goes to its mid-point.
+
+    Parameters
+    ----------
+    state : float64 array of shape (6,)
+        Of `initial`; changed in place.
+
+    Examples
+    --------
+    >>> state = initial(HalfWay(1.0, 0.0))
+    >>> after_goal(state)
+    >>> after_copy(state)  # half-way from 0.5 to the mid-point 0.25
+    >>> state[VALUE]
+    np.float64(0.375)
+    """
     state[VALUE] += state[SHARE] * (state[AIM] - state[VALUE])

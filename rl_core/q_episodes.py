@@ -175,10 +175,10 @@ class GymnasiumWorld:
     """
 
     def __init__(self, environment: gymnasium.Env[Any, Any], owned: bool) -> None:
-        self.n_observations = GymnasiumEnvironment(environment, owned).n_observations
         actions = environment.action_space
         if not isinstance(actions, spaces.Discrete):
             raise ValueError(f"env must have a Discrete action space, got {actions}")
+        self.n_observations = GymnasiumEnvironment(environment, owned).n_observations
         self.n_actions, self._start = int(actions.n), int(actions.start)
         self._environment, self._owned = environment, owned
         self._seed: int | None = None

@@ -31,6 +31,11 @@ def action_values(weights: Weights, observations: NDArray[np.floating]) -> NDArr
     -------
     float32 array of shape (n, n_actions)
 
+    Raises
+    ------
+    ValueError
+        If the weights are not those of one network, or the observations have another shape.
+
     Examples
     --------
     >>> weights = {"layer0.weight": np.array([[1, 2, 3], [0, 0, 10]], np.float32)}
@@ -38,6 +43,10 @@ def action_values(weights: Weights, observations: NDArray[np.floating]) -> NDArr
     array([[ 1.,  2., 13.]], dtype=float32)
     """
     sizes, parameters = networks.pack(weights)
+    observations = np.asarray(observations)
+    fits = observations.ndim == 2 and observations.shape[1] == sizes[0]
+    allowed = f"an array whose shape is (n, {sizes[0]}), for this network"
+    require(fits, "observations", observations.shape, allowed)
     return networks.output(sizes, parameters, observations)
 
 
@@ -120,6 +129,8 @@ def evaluate(
 
     Raises
     ------
+    TypeError
+        If `rng` is not a numpy.random.Generator.
     ValueError
         If an argument is out of range, or the weights do not fit the environment.
 
@@ -133,7 +144,7 @@ def evaluate(
     (True, True)
     """
     require(is_integer(episodes, 1), "episodes", episodes, "a positive integer")
-    _check(max_steps, epsilon)
+    _check(rng, max_steps, epsilon)
     sizes, parameters = networks.pack(weights)
     world = _open(env, sizes)
     world.seed(int(rng.integers(2**32)))
@@ -168,7 +179,7 @@ def q_rollout(
 
     Raises
     ------
-    ValueError
+    TypeError, ValueError
         As for `evaluate`.
 
     Examples
@@ -178,7 +189,7 @@ def q_rollout(
     >>> episode.observations.shape, episode.terminated
     ((101, 2), False)
     """
-    _check(max_steps, epsilon)
+    _check(rng, max_steps, epsilon)
     sizes, parameters = networks.pack(weights)
     world = _open(env, sizes)
     environment_seed = int(rng.integers(2**32))
@@ -198,7 +209,9 @@ def q_rollout(
 _Kept = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float64]]
 
 
-def _check(max_steps: int, epsilon: float) -> None:
+def _check(rng: object, max_steps: int, epsilon: float) -> None:
+    if not isinstance(rng, np.random.Generator):
+        raise TypeError(f"rng must be a numpy.random.Generator, got {rng!r}")
     require(is_integer(max_steps, 1), "max_steps", max_steps, "a positive integer")
     valid = is_number(epsilon) and 0 <= epsilon <= 1
     require(valid, "epsilon", epsilon, "a number from 0 to 1")

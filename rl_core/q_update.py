@@ -99,6 +99,18 @@ def make_learner(
 ) -> Learner:
     """Make the learner of one seed; it changes `parameters` in place.
 
+    Parameters
+    ----------
+    sizes : tuple of int
+        Widths of the network, from the observation's to the number of actions.
+    parameters : float32 array of shape (P,)
+        theta to begin with (`rl_core.networks`).
+    biases, adam : bool
+        Whether biases are learned, and whether with Adam or RMSProp.
+    batch_size : int
+    schedule : float, Decay or HalfWay
+        Epsilon.
+
     Examples
     --------
     >>> theta = networks.xavier_uniform((2, 4, 3), np.random.default_rng(0))
@@ -151,6 +163,15 @@ def epsilon_greedy(
         Uniforms in [0, 1): u decides whether to explore, v picks among random or tied actions.
     units : float32 array of shape (sum(sizes),)
         Scratch space.
+
+    Examples
+    --------
+    >>> theta = np.array([1, 5, 2, 0, 0, 0], np.float32)  # one input, three actions, no bias
+    >>> s, units = np.ones(1, np.float32), np.empty(4, np.float32)
+    >>> epsilon_greedy(np.array([1, 3]), theta, 0.1, s, 0.3, 0.9, units)
+    1
+    >>> epsilon_greedy(np.array([1, 3]), theta, 0.1, s, 0.05, 0.9, units)  # u < 0.1: at random
+    2
     """
     for i in range(observation.size):
         units[i] = observation[i]
@@ -168,7 +189,26 @@ def act(
     v: float,
     units: NDArray[np.float32],
 ) -> int:
-    """Act as the learner does: epsilon-greedy, a random action being kept for a while."""
+    """Act as the learner does: epsilon-greedy, a random action being kept for a while.
+
+    Parameters
+    ----------
+    settings : Settings
+        Its `persistence` says for how many steps.
+    learner : Learner
+        Its `counts` are changed.
+    observation, u, v, units
+        As for `epsilon_greedy`.
+
+    Examples
+    --------
+    >>> way = Settings(0.9, 2, 1, 1, 10, 3, 1e-3, True, False)  # persistence 3
+    >>> theta = np.array([0, 0, 1, 0, 0, 0], np.float32)
+    >>> learner = make_learner((1, 3), theta, biases=False, adam=True, batch_size=2, schedule=0.1)
+    >>> s, units = np.ones(1, np.float32), np.empty(4, np.float32)
+    >>> [act(way, learner, s, u, 0.0, units) for u in (0.5, 0.05, 0.5, 0.5, 0.5)]
+    [2, 0, 0, 0, 2]
+    """
     counts, probability = learner.counts, learner.epsilon[epsilon.VALUE]
     if counts[KEPT] > 0:
         counts[KEPT] -= 1
@@ -183,7 +223,25 @@ def act(
 
 @compiled
 def after_episode(learner: Learner, terminated: bool) -> None:
-    """End an episode: no action is kept, and a goal reached lets epsilon fall."""
+    """End an episode: no action is kept, and a goal reached lets epsilon fall.
+
+    Parameters
+    ----------
+    learner : Learner
+        Its `counts` and `epsilon` are changed.
+    terminated : bool
+        Whether the episode reached its end by itself.
+
+    Examples
+    --------
+    >>> theta, schedule = np.zeros(9, np.float32), epsilon.HalfWay(1.0, 0.0)
+    >>> learner = make_learner(
+    ...     (2, 3), theta, biases=False, adam=True, batch_size=2, schedule=schedule
+    ... )
+    >>> after_episode(learner, terminated=True)
+    >>> learner.epsilon[epsilon.VALUE]
+    np.float64(0.5)
+    """
     learner.counts[KEPT] = 0
     if terminated:
         epsilon.after_goal(learner.epsilon)
@@ -203,10 +261,35 @@ def remember(
 ) -> int:
     """Store a transition with its shaped reward, and say whether an update is due now.
 
+    Parameters
+    ----------
+    settings : Settings
+    learner : Learner
+        Its `counts` and `epsilon` are changed.
+    memory : Memory
+        Changed in place.
+    shape : compiled function
+        `shape(next_observation, reward)`, the reward to learn from (`rl_core.shaping`).
+    observation, action, reward, next_observation
+        The transition (s, a, r, s').
+    terminated : bool
+        Whether s' is terminal; false where the episode is only cut short.
+
     Returns
     -------
     int
         `NOTHING`, `DUE`, or `NOT_A_NUMBER` if that is what the shaped reward is.
+
+    Examples
+    --------
+    >>> from rl_core.shaping import compiled_shape
+    >>> way = Settings(0.9, 2, 2, 1, 10, 1, 1e-3, True, False)  # learning starts after two steps
+    >>> theta = np.zeros(9, np.float32)
+    >>> learner = make_learner((2, 3), theta, biases=False, adam=True, batch_size=2, schedule=0.1)
+    >>> memory, s = replay.make_memory(5, 2), np.ones(2, np.float32)
+    >>> shape = compiled_shape("rl_core.shaping:original")
+    >>> [remember(way, learner, memory, shape, s, 0, -1.0, s, False) == DUE for _ in range(2)]
+    [False, True]
     """
     shaped = shape(next_observation, reward)
     if math.isnan(shaped):
@@ -244,7 +327,25 @@ def _next_values(learner: Learner, memory: Memory) -> None:
 
 @compiled
 def target(settings: Settings, memory: Memory, slot: int) -> float:
-    """The target y of the transition in a slot, whose V is up to date."""
+    """The target y of the transition in a slot, whose V is up to date.
+
+    Parameters
+    ----------
+    settings : Settings
+        gamma, and whether to bootstrap through the end.
+    memory : Memory
+    slot : int
+
+    Examples
+    --------
+    >>> way = Settings(0.9, 2, 1, 1, 10, 1, 1e-3, True, False)
+    >>> memory, s = replay.make_memory(5, 2), np.ones(2, np.float32)
+    >>> for end in (False, True):
+    ...     replay.store(memory, s, 0, -1.0, s, end)
+    >>> memory.next_values[:2] = 10.0
+    >>> target(way, memory, 0), target(way, memory, 1)
+    (8.0, -1.0)
+    """
     if memory.ends[slot] and not settings.through_end:
         return float(memory.rewards[slot])
     return float(memory.rewards[slot] + settings.gamma * memory.next_values[slot])
@@ -252,7 +353,30 @@ def target(settings: Settings, memory: Memory, slot: int) -> float:
 
 @compiled
 def loss_gradient(settings: Settings, learner: Learner, memory: Memory) -> float:
-    """L(theta) of the sampled batch; its gradient is left in `learner.gradient`."""
+    """L(theta) of the sampled batch; its gradient is left in `learner.gradient`.
+
+    Parameters
+    ----------
+    settings : Settings
+    learner : Learner
+        Its `slots` say which transitions; `units`, `deltas` and `gradient` are overwritten.
+    memory : Memory
+        Its cache of V is brought up to date where it is read.
+
+    Examples
+    --------
+    >>> way = Settings(0.9, 2, 1, 1, 10, 1, 1e-3, True, False)
+    >>> theta = np.zeros(9, np.float32)
+    >>> learner = make_learner((2, 3), theta, biases=False, adam=True, batch_size=2, schedule=0.1)
+    >>> memory, s = replay.make_memory(5, 2), np.ones(2, np.float32)
+    >>> for reward in (-1.0, -3.0):
+    ...     replay.store(memory, s, 0, reward, s, False)
+    >>> learner.slots[:] = 0, 1
+    >>> loss_gradient(way, learner, memory)  # (1 + 9) / 2
+    5.0
+    >>> learner.gradient[:3]  # of both inputs' weights to action 0: (2 (1) + 2 (3)) / 2
+    array([4., 4., 0.], dtype=float32)
+    """
     n, n_padded = learner.slots.size, networks.padded(learner.slots.size)
     n_in, n_out = learner.sizes[0], learner.sizes[-1]
     units, deltas = learner.units, learner.deltas
@@ -292,6 +416,18 @@ def update(
     -------
     bool
         False if the loss is not finite; then nothing is changed.
+
+    Examples
+    --------
+    >>> way = Settings(0.9, 2, 1, 1, 1, 1, 1e-3, True, False)  # Adam, a copy at each update
+    >>> theta = np.zeros(9, np.float32)
+    >>> learner = make_learner((2, 3), theta, biases=False, adam=True, batch_size=2, schedule=0.1)
+    >>> memory, s = replay.make_memory(5, 2), np.ones(2, np.float32)
+    >>> replay.store(memory, s, 0, -1.0, s, False)
+    >>> update(way, learner, memory, np.array([0.2, 0.7]))
+    True
+    >>> learner.parameters[:3].round(4), int(learner.counts[COPIES])
+    (array([-0.001, -0.001,  0.   ], dtype=float32), 1)
     """
     replay.sample(memory, uniforms, learner.slots)
     loss = loss_gradient(settings, learner, memory)

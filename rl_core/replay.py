@@ -55,6 +55,13 @@ class Memory(NamedTuple):
 def make_memory(capacity: int, n_observations: int) -> Memory:
     """Make an empty memory.
 
+    Parameters
+    ----------
+    capacity : int
+        N, the transitions that it keeps, at least 1.
+    n_observations : int
+        Numbers in an observation.
+
     Examples
     --------
     >>> memory = make_memory(3000, 6)
@@ -75,7 +82,16 @@ def make_memory(capacity: int, n_observations: int) -> Memory:
 
 @compiled
 def held(memory: Memory) -> int:
-    """Number of transitions that can be sampled."""
+    """Number of transitions that can be sampled: all stored so far, at most N.
+
+    Examples
+    --------
+    >>> memory, s = make_memory(2, 1), np.ones(1, np.float32)
+    >>> for _ in range(3):
+    ...     store(memory, s, 0, -1.0, s, False)
+    >>> held(memory)
+    2
+    """
     return min(int(memory.stored[0]), memory.actions.size)
 
 
@@ -89,6 +105,17 @@ def store(
     end: bool,
 ) -> None:
     """Store a transition in the place of the oldest.
+
+    Parameters
+    ----------
+    memory : Memory
+        Changed in place.
+    observation, next_observation : float32 arrays of shape (n_observations,)
+        s and s', which are copied.
+    action : int
+    reward : float
+    end : bool
+        Whether s' is terminal.
 
     Examples
     --------

@@ -4,9 +4,9 @@ A shaping is a function `f(observation, reward) -> float` of the next observatio
 and the environment's reward. It stands at the top of a module, is named in a config, and is
 compiled, so that it runs inside the compiled loop and gives the same bits in the plain one.
 
-`tip_height` and `distance_from_start` are the report's (section 3.2). Neither is a difference of potentials, so the best
-policy under them need not be the best under the original rewards (Ng, Harada and Russell 1999,
-Policy invariance under reward transformations).
+`tip_height` and `distance_from_start` are the report's (section 3.2). Neither is a difference of
+potentials, so the best policy under them need not be the best under the original rewards (Ng,
+Harada and Russell 1999, Policy invariance under reward transformations).
 """
 
 import hashlib

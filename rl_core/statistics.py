@@ -176,6 +176,9 @@ def probability_of_improvement(
     with a percentile bootstrap interval that draws the seeds of each arm independently (Agarwal et
     al. 2021, section 4.3). Half means that neither is better.
 
+    If all values of both arms are infinite, no seed of either got there. That says nothing of which
+    is better, so the interval is [0, 1]; draws of equal seeds alone would make it [0.5, 0.5].
+
     Parameters
     ----------
     a, b : array, shape (seeds,)
@@ -193,12 +196,16 @@ def probability_of_improvement(
     >>> rng = np.random.default_rng(0)
     >>> probability_of_improvement([1.0, 2.0], [2.0, np.inf], rng=rng).estimate
     0.875
+    >>> tuple(probability_of_improvement([np.inf], [np.inf], rng=rng))
+    (0.5, 0.0, 1.0)
     """
     a, b = _checked_values("a", a), _checked_values("b", b)
     _check_draws(rng, level, resamples)
     for name, values in (("a", a), ("b", b)):
         if values.ndim != 1 or np.isnan(values).any():
             raise ValueError(f"{name} has shape {values.shape}; allowed is (seeds,) without NaN")
+    if np.isposinf(a).all() and np.isposinf(b).all():
+        return Interval(0.5, 0.0, 1.0)
     # Counted in halves, whole numbers: rounding cannot push the limits past the estimate.
     halves = 2.0 * (a[:, None] < b) + (a[:, None] == b)
     drawn_a, drawn_b = (_seed_counts(len(arm), resamples, rng) for arm in (a, b))

@@ -119,6 +119,33 @@ def test_only_what_is_open_is_said_to_need_more_seeds():
     assert what_it_would_take([finding]) == "1a, criterion 1: no number"
 
 
+def criterion_finding(criterion, *interval, seeds=30):
+    claim = Claim("1a", "1.1", "Something is so.", (criterion,), "Figure 1")
+    return claim.judge(Evidence(*interval, seeds=seeds))
+
+
+@pytest.mark.parametrize(
+    ("criterion", "interval", "answer"),
+    [
+        (Criterion("above a half", above=0.5), (0.625, 0.375, 0.875), "1a, criterion 1: 120"),
+        (Criterion("an eighth", at_least=0.125), (0.25, 0.0, 0.5), "1a, criterion 1: 120"),
+        (Criterion("at most", at_most=0.25), (0.125, 0.0, 0.5), "1a, criterion 1: 120"),
+        (Criterion("both", 60, 100), (75, 50, 110), "1a, criterion 1: 120"),  # not the 50 of 100
+        (Criterion("the bound", above=0.5), (0.5, 0.4, 0.6), "1a, criterion 1: no number"),
+        (Criterion("no end", at_most=9), (math.inf, 5, math.inf), "1a, criterion 1: no number"),
+        (Criterion("settled", above=0.5), (0.7, 0.6, 0.8), "none is open"),
+    ],
+)
+def test_what_it_would_take_by_hand(criterion, interval, answer):
+    """30 seeds, and a half width twice the distance to the bound: 30 times 2 squared."""
+    assert what_it_would_take([criterion_finding(criterion, *interval)]) == answer
+
+
+def test_no_seeds_give_no_number():
+    nothing = criterion_finding(Criterion("above a half", above=0.5), 0.5, 0.0, 1.0, seeds=0)
+    assert what_it_would_take([nothing]) == "1a, criterion 1: no number"
+
+
 def test_large_numbers_are_written_out():
     finding = claim(MANY).judge(Evidence(1234, -math.inf, math.inf, seeds=30))
     assert details([finding])["measured"].tolist() == ["1,234 [−∞, ∞]"]

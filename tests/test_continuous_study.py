@@ -41,6 +41,7 @@ def made_up(arm, level=200):
 @pytest.fixture(autouse=True)
 def short(monkeypatch):
     monkeypatch.setattr(study, "EPISODES", EPISODES)
+    monkeypatch.setattr(drawings, "EPISODES", EPISODES)
     monkeypatch.setattr(study, "SNAPSHOTS", (100,))
     for module in (study, what_became, drawings):
         monkeypatch.setattr(module, "SEEDS", range(5))
@@ -56,13 +57,51 @@ def test_fates_by_hand():
     assert tuple(what_became.fates(curves, "as reported", log_sigma)) == what_became.FATES
 
 
-def test_a_good_seed_stopped_by_its_budget_is_slow_not_stuck():
+def test_the_force_of_pressing_seeds_by_hand():
+    curves = curves_of(made_up("as reported"))
+    log_sigma = np.full((5, 1), np.log(SIGMA))
+    assert what_became.pressing_forces(curves, "as reported", log_sigma) == pytest.approx([3.0])
+
+
+CUT = [*[True] * 400, False]
+
+
+@pytest.mark.parametrize(
+    ("steps", "terminated", "fate"),
+    [
+        ([*[200] * 400, 50], CUT, "learned"),
+        ([500_000, *[200] * 400, 50], [False, *CUT], "learned"),  # it recovered
+        ([*[900] * 400, 50], CUT, "still slow"),
+        ([500_000, *[900] * 400, 50], [False, *CUT], "still slow"),
+        ([*[200] * 90, 50], CUT[-91:], "still slow"),  # fewer than the 100 that it is judged by
+        ([*[200] * 400, 500_000, 50], [*CUT, False], "out, then idle"),  # stuck, then cut
+        ([*[200] * 400, 300_000], CUT, "out, then idle"),  # stuck in the episode that is cut
+    ],
+)
+def test_a_seed_cut_by_its_budget_is_judged_by_what_it_finished(steps, terminated, fate):
     rows = made_up("as reported")
-    rows = rows[rows["seed"] > 0]
-    first = seed_rows("as reported", 0, [*[200] * 400, 50], [*[True] * 400, False])
-    curves = curves_of(first, rows)
+    first = seed_rows("as reported", 0, steps, terminated)
+    curves = curves_of(first, rows[rows["seed"] > 0])
     found = what_became.fates(curves, "as reported", np.full((5, 1), np.log(SIGMA)))
-    assert found[0] == "still slow"
+    assert found[0] == fate
+    judged = fate != "out, then idle"
+    assert curves.learned("as reported")[0] == (fate == "learned")
+    assert curves.out_of_budget("as reported").tolist() == [judged, *[False] * 4]
+    assert np.isfinite(curves.at("as reported")[0]) == judged
+    assert np.isfinite(curves.final_return("as reported")[0]) == judged
+
+
+def test_a_seed_cut_by_its_budget_keeps_its_last_measures():
+    steps = np.arange(1_000, 550, -1)
+    first = seed_rows("as reported", 0, [*steps, 3], [*[True] * len(steps), False])
+    rows = made_up("as reported")
+    curves = curves_of(first, rows[rows["seed"] > 0])
+    last = np.median(steps[-100:])
+    assert curves.at("as reported")[0] == curves.at("as reported", 500)[0] == last
+    assert curves.at("as reported", 200)[0] == np.median(steps[100:200])
+    np.testing.assert_array_equal(curves.last("as reported", 100, 200)[0], steps[100:200])
+    np.testing.assert_array_equal(curves.last("as reported", 100)[0], steps[-100:])
+    assert not curves.learned("as reported", 500)[0]
 
 
 def test_measures_by_hand():
@@ -108,6 +147,10 @@ def test_without_a_seed_that_learned_nothing_is_claimed():
     none = table[(table["arm"] == "sigma 1") & (table["measure"] == "steps")].iloc[0]
     assert np.isinf([none["low"], none["high"]]).all()
     assert len(drawings.tradeoff(table).axes) == 6
+    original = pd.DataFrame({"episode": [1, 2], "low": [9.0, 8.0], "high": [9.5, 8.5]})
+    arms = {"as reported": "two", "three features": "three"}
+    assert len(drawings.learning_curves(curves, arms, original).axes) == 2
+    assert set(drawings.curve_data(curves, list(arms))["arm"]) == set(arms)
 
 
 def test_arms_are_the_reports_with_one_thing_changed():

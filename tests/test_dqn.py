@@ -63,6 +63,22 @@ class Corridor(gymnasium.Env):
         return np.eye(3, dtype=np.float32)[min(self.cell, 2)], float(over), over, False, {}
 
 
+class Endless(gymnasium.Env):
+    """Pays 1 a step and never ends, but is cut off after each step."""
+
+    observation_space = spaces.Box(1, 1, (1,), np.float32)
+    action_space = spaces.Discrete(2)
+
+    def reset(self, *, seed=None, options=None):
+        """The only state."""
+        super().reset(seed=seed)
+        return np.ones(1, np.float32), {}
+
+    def step(self, action):
+        """Pay, and truncate."""
+        return np.ones(1, np.float32), 1.0, False, True, {}
+
+
 class Breaking(Corridor):
     """Pays `payment` in the third episode of those seeds whose first draw says so."""
 
@@ -85,6 +101,25 @@ class Breaking(Corridor):
 
 def breaks(environment_seed):
     return np.random.default_rng(environment_seed).random() < 0.5
+
+
+class Recording(gymnasium.Wrapper):
+    """Notes where episodes start and what is done in them."""
+
+    def __init__(self, env):
+        super().__init__(env)
+        self.starts, self.actions = [], []
+
+    def reset(self, **arguments):
+        """Begin, and note where."""
+        observation, info = super().reset(**arguments)
+        self.starts.append(float(observation[0]))
+        return observation, info
+
+    def step(self, action):
+        """Note the action."""
+        self.actions.append(int(action))
+        return super().step(action)
 
 
 def nan_beyond(observation, reward):
@@ -379,8 +414,26 @@ def test_seeds_differ_in_weights_actions_batches_and_environment():
     run = dqn("Acrobot-v1", SMALL, episodes=1, seeds=range(10))
     assert len(np.unique(run.arrays["initial/layer0.weight"].reshape(10, -1), axis=0)) == 10
     assert len(np.unique(run.arrays["layer0.weight"].reshape(10, -1), axis=0)) == 10
-    draws = [spawn_streams(seed).replay.random() for seed in range(10)]
-    assert len(set(draws)) == 10
+    streams = [spawn_streams(seed) for seed in range(10)]
+    for draw in (
+        lambda one: one.replay.random(),
+        lambda one: one.policy.random(),
+        lambda one: one.environment_seed,
+    ):
+        assert len({draw(one) for one in streams}) == 10
+
+
+def test_actions_and_starts_that_the_agents_meet_differ_from_seed_to_seed():
+    config = dataclasses.replace(SMALL, epsilon=1.0, learning_starts=1_000, max_episode_steps=30)
+    config = dataclasses.replace(config, hidden=())
+    met = []
+    for seed in range(10):
+        env = Recording(gymnasium.make("MountainCar-v0").unwrapped)
+        dqn(env, config, episodes=1, seeds=[seed])
+        met.append((env.starts[0], tuple(env.actions)))
+    starts, actions = zip(*met, strict=True)
+    assert len(set(starts)) == 10
+    assert len(set(actions)) == 10
 
 
 def test_global_random_states_are_left_alone():
@@ -515,6 +568,24 @@ def test_the_values_of_a_corridor_are_learned():
     assert (run.arrays["layer0.weight"][:, 2, 1] > 1.5).all()  # 1 + 0.5 * 2: the end is worth more
 
 
+def test_a_truncated_step_is_stored_as_one_that_goes_on():
+    """Gamma 0.5 and 1 a step for ever: Q* = 2. Were truncation taken for the end, Q would be 1."""
+    config = DQNConfig(
+        gamma=0.5,
+        hidden=(),
+        optimiser="adam",
+        learning_rate=1e-2,
+        batch_size=16,
+        memory_size=100,
+        learning_starts=16,
+        copy_every=20,
+        epsilon=0.5,
+    )
+    run = dqn(Endless, config, episodes=1_000, seeds=[0, 1])
+    assert not run.table["terminated"].any()
+    np.testing.assert_allclose(run.arrays["layer0.weight"], 2.0, atol=0.05)
+
+
 CART_POLE = DQNConfig(
     hidden=(64, 64),
     biases=True,
@@ -633,6 +704,10 @@ def test_environments_with_other_spaces_are_refused():
         dqn("MountainCarContinuous-v0", SMALL, episodes=1, seeds=[0])
     with pytest.raises(ValueError, match="Box observation space"):
         dqn("FrozenLake-v1", SMALL, episodes=1, seeds=[0])
+    several = gymnasium.make("CartPole-v1").unwrapped
+    several.action_space = spaces.MultiDiscrete([2, 2])
+    with pytest.raises(ValueError, match=r"env must have a Discrete action space, got MultiD"):
+        dqn(several, SMALL, episodes=1, seeds=[0])
     with pytest.raises(ValueError, match="env must be an id that Gymnasium knows"):
         dqn("Pole-v7", SMALL, episodes=1, seeds=[0])
     with pytest.raises(ValueError, match="env must be an id that Gymnasium knows"):

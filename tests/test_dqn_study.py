@@ -43,6 +43,79 @@ def test_each_cause_is_one_change_and_all_four_are_all():
     assert len(study.causes()) == 2 + 2 * len(study.RIVALS)
 
 
+LEVELS = {  # steps of every episode; what is not named needs 5,000
+    "Acrobot": {
+        "shaped": 150,
+        "shaped, gamma 0.9": 300,
+        "shaped, no replay": 100,
+        "shaped, no fixed target": 400,
+        "original": 1_000,
+        "original, no replay": 800,
+        "original, all four": 200,
+    },
+    "MountainCar": {
+        "shaped": 250,
+        "shaped, gamma 0.9": 300,
+        "shaped, no replay": 260,
+        "shaped, no fixed target": 220,
+        "original": 240,
+        "original, no replay": 700,
+        "original, all four": 1_000,
+    },
+}
+
+
+def arm_rows(arm):
+    """Twelve seeds of an arm whose episodes all take as long; two are slow on Acrobot's figure."""
+    name, _, variant = arm.partition(", ")
+    tables = []
+    for seed in range(12):
+        steps, count = LEVELS[name].get(variant, 5_000), study.EPISODES
+        if variant == "as reported":
+            steps = 80 if name == "Acrobot" and seed < 10 else 900
+        else:
+            count = study.BUDGET[name] // steps
+        table = episodes([steps] * count, [True] * count)
+        tables.append(table.assign(arm=arm, seed=seed, episode=range(1, count + 1)))
+    return pd.concat(tables)
+
+
+def test_claims_are_judged_by_the_arms_they_name(monkeypatch):
+    monkeypatch.setattr(study, "SEEDS", range(12))
+    curves = study.Curves(pd.concat([arm_rows(arm.name) for arm in study.arms()]))
+    found = {finding.claim.id: finding for finding in study.findings(curves)}
+    estimates = {name: [e.estimate for e in finding.evidence] for name, finding in found.items()}
+    assert estimates == {
+        "3f": [80, 80],
+        "3g": [900, np.inf],
+        "3h": [0, 1, 1, 0],
+        "3i": [1, 1, 1, 0.5],
+        "3j": [0, 1],
+        "3k": [1, 0],
+        "3l": [1, 1, 0, 0],
+    }
+    assert [e.seeds for e in found["3f"].evidence] == [12, 10]
+    nothing = found["3g"].evidence[1]  # no seed had learned by then
+    assert (nothing.low, nothing.high, nothing.seeds) == (-np.inf, np.inf, 0)
+    assert found["3g"].answers == ("no", "open")
+    never = found["3i"].evidence[3]  # neither arm gets to 200 steps a goal
+    assert (never.low, never.high) == (0, 1)
+
+
+def test_the_share_of_random_steps_is_that_of_the_actions_taken():
+    config = study.mended("MountainCar", ("exploration",))
+    assert study.random_share(study.reported("Acrobot"), 0.1) == pytest.approx(0.1)
+    share = study.random_share(config, 0.1)
+    rng, left, steps = np.random.default_rng(0), 0, 0
+    for _ in range(50_000):
+        if left == 0 and rng.random() < 0.1:
+            left = config.persistence
+        steps += left > 0
+        left = max(left - 1, 0)
+    assert share == pytest.approx(1 / 1.9)
+    assert steps / 50_000 == pytest.approx(share, abs=0.02)
+
+
 def test_the_criteria_cover_the_claims_of_section_3_2():
     assert [claim.id for claim in study.CLAIMS] == ["3f", "3g", "3h", "3i", "3j", "3k", "3l"]
     with pytest.raises(ValueError, match="criteria"):

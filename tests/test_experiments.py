@@ -48,6 +48,14 @@ CAR = Arm(
     4,
     (0, 2, 4),
 )
+DEEP = Arm(
+    "DQN",
+    dqn,
+    "MountainCar-v0",
+    DQNConfig(batch_size=16, memory_size=100, learning_starts=100, max_episode_steps=200),
+    4,
+    (0, 2, 4),
+)
 quiet = {"progress": False}
 
 
@@ -103,7 +111,7 @@ def test_blocks_of_any_size_give_the_same_bits(tmp_path, block):
     assert_results_are(results, [PLAIN, BOLD], range(30))
 
 
-@pytest.mark.parametrize("arm", [BOLD, ACROBOT, CAR])
+@pytest.mark.parametrize("arm", [BOLD, ACROBOT, CAR, DEEP])
 def test_a_seed_alone_gives_the_bits_it_has_among_thirty(tmp_path, arm):
     thirty = run([arm], seeds=range(30), store=tmp_path / "30", workers=1, block=30, **quiet)
     stacked = thirty.arrays(arm.name)
@@ -124,7 +132,7 @@ def test_a_seed_alone_gives_the_bits_it_has_among_thirty(tmp_path, arm):
 
 @pytest.mark.parametrize("backend", ["loky", "threading", "multiprocessing"])
 def test_two_workers_give_the_same_bits(tmp_path, backend):
-    arms = [PLAIN, BOLD, ACROBOT, CAR]
+    arms = [PLAIN, BOLD, ACROBOT, CAR, DEEP]
     results = run(arms, seeds=range(6), store=tmp_path, block=2, backend=backend, **quiet)
     assert_results_are(results, arms, range(6))
 
@@ -138,7 +146,7 @@ def test_dask_gives_the_same_bits(tmp_path):
         ) as cluster,
         Client(cluster),
     ):
-        arms = [PLAIN, BOLD, ACROBOT, CAR]
+        arms = [PLAIN, BOLD, ACROBOT, CAR, DEEP]
         results = run(arms, seeds=range(6), store=tmp_path, backend="dask", block=2, **quiet)
     assert_results_are(results, arms, range(6))
 

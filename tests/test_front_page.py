@@ -86,6 +86,14 @@ def test_figures_are_linked(text, targets):
     assert [link.replace(".html", "") for link in links] == targets
 
 
+def test_a_thumbnail_shows_the_first_arm_of_a_figure_with_several(tmp_path):
+    rows = pd.DataFrame({"episode": [1, 2, 1], "seed": [0, 0, 1], "steps": [9.0, 8.0, 7.0]})
+    table = pd.concat([rows.assign(arm="as reported"), rows.assign(arm="other", steps=1.0)])
+    table.to_csv(tmp_path / "figure.csv", index=False)
+    found = front_page.curves(tmp_path / "figure.csv")
+    np.testing.assert_array_equal(found, [[9.0, 7.0], [8.0, np.inf]])
+
+
 def test_every_chapter_has_its_page():
     book = Path(front_page.__file__).parent
     notebooks = {path.stem for path in book.glob("[0-9]*.ipynb")}

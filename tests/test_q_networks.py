@@ -32,6 +32,19 @@ def test_values_are_those_of_the_same_network_in_torch():
     np.testing.assert_allclose(action_values(weights, observations), expected, atol=1e-5)
 
 
+@pytest.mark.parametrize("shape", [(2,), (5, 1), (5, 3), (1, 5, 2)])
+def test_observations_of_another_width_are_refused_not_broadcast(shape):
+    with pytest.raises(ValueError, match=r"^observations must be .*\(n, 2\)"):
+        action_values(BY_SPEED, np.ones(shape))
+
+
+def test_a_seed_in_the_place_of_a_generator_is_refused():
+    with pytest.raises(TypeError, match=r"rng must be a numpy.random.Generator, got 0"):
+        q_rollout("MountainCar-v0", BY_SPEED, 0, 10)
+    with pytest.raises(TypeError, match=r"rng must be a numpy.random.Generator, got 0"):
+        evaluate("MountainCar-v0", BY_SPEED, 0, episodes=1, max_steps=10)
+
+
 @pytest.mark.parametrize("epsilon", [0.0, 0.3])
 @pytest.mark.parametrize("name", ["Acrobot-v1", "MountainCar-v0"])
 def test_compiled_and_plain_episodes_are_the_same(name, epsilon):

@@ -258,6 +258,14 @@ def test_probability_of_improvement_takes_infinities_and_refuses_nan():
         probability_of_improvement([1.0], [np.nan], rng=generator())
 
 
+def test_arms_in_which_no_seed_gets_there_are_no_evidence_for_equality():
+    nobody = np.full(30, np.inf)
+    assert probability_of_improvement(nobody, nobody, rng=generator()) == (0.5, 0.0, 1.0)
+    one = np.append(nobody[1:], 7.0)
+    estimate, low, high = probability_of_improvement(one, nobody, rng=generator())
+    assert 0.5 <= low < estimate < high < 1
+
+
 # --- fractions ------------------------------------------------------------------------------------
 
 

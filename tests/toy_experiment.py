@@ -7,6 +7,7 @@ from pathlib import Path
 import pandas as pd
 from toy_learner import ToyConfig, learn
 
+from rl_core.dqn import DQNConfig, dqn
 from rl_core.experiments import Arm, Results, run
 from rl_core.policies import Gaussian
 from rl_core.reinforce import ReinforceConfig, reinforce
@@ -36,6 +37,16 @@ ARMS = {
             ReinforceConfig(policy=Gaussian(learn_sigma=True), max_episode_steps=1000),
             15,
             (0, 15),
+        )
+    ]
+    + [
+        Arm(
+            "DQN",
+            dqn,
+            "MountainCar-v0",
+            DQNConfig(batch_size=32, memory_size=300, learning_starts=200, max_episode_steps=500),
+            6,
+            (0, 6),
         )
     ],
 }
