@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
+from seeds import SEEDS
 
 from rl_core import claims as judged
 from rl_core.figures import BLUE, GREY
@@ -192,18 +193,19 @@ def _spoken(table: pd.DataFrame) -> str:
     return ", ".join(f"{count} {verdict}" for verdict, count in counts(table).items())
 
 
-def curves(path: Path) -> pd.DataFrame:
+def curves(path: Path, seeds: range = SEEDS) -> pd.DataFrame:
     """Read a figure's data as one column a seed, with the episode as index.
 
     It has either columns `episode, seed_0, seed_1, ...` or rows `episode, seed, steps`. Of several
     arms the first is taken, which is the report's. A seed that stopped before the end needs for
-    ever from there on.
+    ever from there on, one that has no row at all from the beginning.
     """
     table = pd.read_csv(path)
     if "arm" in table:
         table = table[table["arm"] == table["arm"].iloc[0]]
     if "seed" in table:
-        return table.pivot(index="episode", columns="seed", values="steps").fillna(np.inf)
+        wide = table.pivot(index="episode", columns="seed", values="steps")
+        return wide.reindex(columns=list(seeds)).fillna(np.inf)
     return table.set_index("episode").filter(like="seed_")
 
 
@@ -216,10 +218,12 @@ def _thumbnail(number: int, now: pd.DataFrame, original: pd.DataFrame) -> Figure
     left.plot(original["episode"], middle, color="#9a8423", lw=0.6, ls="-")
     finite = now.replace(np.inf, np.nan)
     right.plot(finite.index, finite, color=GREY, lw=0.3, ls="-", alpha=0.6)
-    median = now.median(axis=1).replace(np.inf, np.nan)
+    lasting = now.loc[:, np.isfinite(now.iloc[-1])]
+    median = lasting.median(axis=1)
     right.plot(median.index, median, color=BLUE, lw=1.4, ls="-")
     left.set_title("2018", fontsize=9)
-    right.set_title(f"now, {now.shape[1]} seeds", fontsize=9)
+    all_or_some = "" if lasting.shape == now.shape else f"{lasting.shape[1]} of "
+    right.set_title(f"now, {all_or_some}{now.shape[1]} seeds", fontsize=9)
     left.set_ylabel(unit, fontsize=8)
     for axes in (left, right):
         axes.tick_params(labelsize=7)
@@ -239,7 +243,7 @@ def _picture(figure: Figure) -> str:
 def _card(number: str, page: str, figure: Figure, title: str, text: str) -> str:
     return (
         f'<a class="thumbnail" href="{page}"><img src="{_picture(figure)}" '
-        f'alt="{html.escape(text)}"><span>Figure {number}. {html.escape(title)}</span></a>'
+        f'alt="{html.escape(text)}"><span>{number}. {html.escape(title)}</span></a>'
     )
 
 
@@ -257,7 +261,7 @@ def thumbnails(results: Path, originals: Path, situation: Figure) -> str:
     """
     cards = [
         _card(
-            "1 to 8",
+            "Figures 1 to 8",
             anchor("Figure 1"),
             situation,
             "The Maze's optimal values and policy",
@@ -269,5 +273,5 @@ def thumbnails(results: Path, originals: Path, situation: Figure) -> str:
         original = pd.read_csv(originals / f"{name}.csv")
         text = f"{title}: {unit} against the episode, the curve of 2018 beside ours."
         figure = _thumbnail(number, now, original)
-        cards.append(_card(f"{number}", anchor(f"Figure {number}"), figure, title, text))
+        cards.append(_card(f"Figure {number}", anchor(f"Figure {number}"), figure, title, text))
     return f'<div class="thumbnails">{"".join(cards)}</div>'

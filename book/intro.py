@@ -49,8 +49,8 @@ glue("seeds", len(SEEDS), display=False)
 HTML(front_page.verdict_bar(claims))
 
 # %% [markdown]
-# The report makes {glue:text}`claims` statements that can be checked. Each got a criterion, written down in code before its data was
-# looked at. {glue:text}`holds` hold, {glue:text}`holds-in-part` hold in part,
+# The report makes {glue:text}`claims` statements that can be checked. Each got a criterion in code. Where one was not
+# fixed before its data was looked at, or its evidence was corrected afterwards, the chapter says so. {glue:text}`holds` hold, {glue:text}`holds-in-part` hold in part,
 # {glue:text}`does-not-hold` do not hold, and of {glue:text}`cannot-tell` our runs cannot tell. What failed stands
 # first. Claims differ in kind: some are theorems, some are numbers that one lucky run produced.
 
@@ -73,8 +73,8 @@ display(HTML(front_page.thumbnails(RESULTS, Path("data/original"), situation)))
 
 # %% [markdown]
 # :::{container} caption
-# Left the published curve, right the median (blue) over all seeds (grey). A picture leads to its figure. Vertical scales are
-# logarithmic, except for the Maze, whose first eight figures have no data of 2018. Data of Figures
+# Left the published curve, right our seeds (grey) and their median (blue). Where some seeds did not come to the last episode, the title says
+# how many did, and the median is theirs. A picture leads to its figure. Vertical scales are logarithmic, except for the Maze, whose first eight figures have no data of 2018. Data of Figures
 # {download}`1 to 8 <../results/maze_q_values.csv>`, {download}`9 <../results/figures/figure_9.csv>`,
 # {download}`10 <../results/figures/figure_10.csv>`, {download}`11 <../results/figures/figure_11.csv>`,
 # {download}`12 <../results/figures/figure_12.csv>`, {download}`13 <../results/figures/figure_13.csv>`,

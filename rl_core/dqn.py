@@ -17,9 +17,9 @@ CartPole-v1 trains through the plain loop. With these settings the average retur
 training episodes is 450 or more for most seeds (`tests/test_dqn.py` holds them to it):
 
     config = DQNConfig(
-        hidden=(64, 64), biases=True, optimiser="adam", learning_rate=2e-3,
+        hidden=(64, 64), biases=True, optimiser="adam", learning_rate=1e-3,
         batch_size=128, memory_size=100_000, learning_starts=500,
-        update_every=4, copy_every=100, epsilon=Decay(1.0, 0.0, 8_000),
+        update_every=2, copy_every=100, epsilon=Decay(1.0, 0.0, 5_000),
         shaping=Shaping("rl_core.shaping:balance"), max_env_steps=80_000,
     )
     run = dqn("CartPole-v1", config, episodes=2_000, seeds=range(10))

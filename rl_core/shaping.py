@@ -64,17 +64,17 @@ def distance_from_start(observation: NDArray[np.float32], reward: float) -> floa
 
 
 def balance(observation: NDArray[np.float32], reward: float) -> float:
-    """CartPole: r = (1 - |x| / 4.8 - 2 |theta|) / 20, most for an upright pole in the middle.
+    """CartPole: r = (1 - |x| / 2.4 - 2 |theta|) / 20, most for an upright pole in the middle.
 
-    x (metres) ends the episode beyond 2.4 and theta (radians) beyond 0.21, so that every step pays
-    something above 0. The factor keeps the values near 1, where a network's weights begin.
+    An episode ends when x (metres) leaves [-2.4, 2.4] or theta (radians) leaves [-0.21, 0.21]. The
+    factor keeps the values near 1, where a network begins.
 
     Examples
     --------
-    >>> balance(np.array([2.4, 0.0, 0.0, 0.0], np.float32), 1.0)
-    0.025
+    >>> balance(np.zeros(4, np.float32), 1.0)
+    0.05
     """
-    return (reward - abs(float(observation[0])) / 4.8 - 2 * abs(float(observation[2]))) / 20
+    return (reward - abs(float(observation[0])) / 2.4 - 2 * abs(float(observation[2]))) / 20
 
 
 @dataclass(frozen=True)
