@@ -91,7 +91,7 @@ pairing: .venv/.installed ## each notebook says the same as its .py twin and hol
 	$(BIN)/pytest tests/pairing.py
 
 notebooks: .venv/.installed ## every notebook at full scale (nbmake)
-	$(BIN)/pytest --nbmake --nbmake-timeout=5400 -o faulthandler_timeout=0 $(NOTEBOOKS)
+	$(BIN)/pytest --nbmake --nbmake-timeout=5400 -o faulthandler_timeout=0 --durations=0 $(NOTEBOOKS)
 
 browser: $(STAMP) ## the built book: claims, links; in a headless Chromium pictures, mathematics, films, search
 	$(BIN)/pytest tests/built_book.py tests/browser.py
