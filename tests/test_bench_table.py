@@ -27,10 +27,10 @@ def test_it_was_measured_in_one_run_on_one_machine():
     [
         (("value iteration", "10⁶ states"), 1),
         (("Q-learning on the Maze, compiled", "gym.make"), 200),
-        (("REINFORCE", "Acrobot", "plain"), 60),
+        (("REINFORCE", "Acrobot", "usual loop"), 60),
         (("REINFORCE", "Acrobot", "A2C"), 30),
-        (("REINFORCE", "MountainCar-v0", "plain"), 40),
-        (("REINFORCE", "MountainCarContinuous", "plain"), 40),
+        (("REINFORCE", "MountainCar-v0", "usual loop"), 40),
+        (("REINFORCE", "MountainCarContinuous", "usual loop"), 40),
         (("DQN", "Acrobot"), 5),
         (("DQN", "MountainCar"), 5),
     ],
