@@ -13,6 +13,7 @@ import torch
 from stable_baselines3 import DQN
 from torch import nn
 
+from bench.table import comparison
 from rl_core.dqn import DQNConfig, dqn
 
 SEEDS = range(30)
@@ -95,16 +96,16 @@ def _row(name: str) -> dict:
     )
     rival = best["theirs"] / STEPS * 1e6
     mine = best["ours"] / STEPS / len(SEEDS) * 1e6
-    return {
-        "benchmark": f"DQN on {name}, batch {CONFIG.batch_size}, an update every step",
-        "rival": round(rival, 3),
-        "ours": round(mine, 4),
-        "ratio": round(rival / mine, 1),
-        "unit": "microseconds a step",
-        "note": "Stable-Baselines3 DQN, one seed; ours: 30 seeds, a seed's share; one core; "
-        f"{STEPS:,} steps a seed, all with an update; widths 10-20, Adam; theirs clips gradients "
-        "and has the Huber loss",
-    }
+    return comparison(
+        f"DQN on {name}, batch {CONFIG.batch_size}, an update every step",
+        "Stable-Baselines3 DQN",
+        rival,
+        mine,
+        "microseconds a step",
+        "rival: one seed; ours: 30 seeds, a seed's share; one core; "
+        f"{STEPS:,} steps a seed, all with an update; widths 10-20, Adam; the rival clips "
+        "gradients and has the Huber loss",
+    )
 
 
 if __name__ == "__main__":

@@ -22,6 +22,8 @@ from typing import Any
 
 import numpy as np
 
+from bench.table import comparison
+
 ROOT = Path(__file__).parent.parent
 GAMMA, TOLERANCE = 0.99, 1e-6
 WALL_FRACTION, SEED = 0.2, 0
@@ -85,26 +87,26 @@ def _row(shape: str, results: dict[Method, dict[str, float]]) -> dict:
     fastest = min(results, key=lambda method: results[method]["rival"])
     seconds = results[fastest]
     difference = max(result["difference"] for result in results.values())
-    return {
-        "benchmark": f"value iteration, maze of {shape}",
-        "rival": round(seconds["rival"], 4),
-        "ours": round(seconds["ours"], 4),
-        "ratio": round(seconds["rival"] / seconds["ours"], 1),
-        "unit": "seconds",
-        "note": f"{' '.join(fastest)}, best of {len(results)}; answers differ by {difference:.0e}",
-    }
+    return comparison(
+        f"value iteration, maze of {shape}",
+        " ".join(fastest),
+        seconds["rival"],
+        seconds["ours"],
+        "seconds",
+        f"the fastest of {len(results)} rivals; answers differ by {difference:.0e}",
+    )
 
 
 def _memory_row() -> dict:
     used = _child("memory", SIDES["10⁶"], FLAGS)
-    return {
-        "benchmark": "value iteration, maze of 10⁶ states: peak memory, model included",
-        "rival": MEMORY_LIMIT,
-        "ours": round(used["peak"], 1),
-        "ratio": round(MEMORY_LIMIT / used["peak"], 2),
-        "unit": "bytes a state",
-        "note": f"against the limit set; the model takes {used['model']:.1f}",
-    }
+    return comparison(
+        "value iteration, maze of 10⁶ states: peak memory, model included",
+        "the limit set",
+        MEMORY_LIMIT,
+        used["peak"],
+        "bytes a state",
+        f"the model takes {used['model']:.1f}",
+    )
 
 
 def _compile_seconds() -> float:

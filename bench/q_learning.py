@@ -6,6 +6,7 @@ from collections.abc import Callable
 import gymnasium as gym
 import numpy as np
 
+from bench.table import comparison
 from rl_core.exploration import EpsilonGreedy
 from rl_core.maze import Maze
 from rl_core.planning import value_iteration
@@ -14,6 +15,7 @@ from rl_core.q_learning import QLearningConfig, q_learning
 GAMMA, STEP_SIZE, EPSILON = 0.9, 0.2, 0.9  # figure 9
 ROUNDS = 5
 UNIT = "microseconds a step"
+RIVALS = {"usual": "usual loop over gym.make(...)", "bare": "usual loop over Maze()"}
 
 
 def usual_loop(env: gym.Env, episodes: int, seed: int) -> int:
@@ -62,20 +64,15 @@ def rows() -> list[dict]:
         for name, way in ways.items():
             best[name] = min(best[name], _microseconds(way, seed))
     pairs = (
-        ("usual", "compiled", "usual loop over gym.make(...), nothing recorded, one core"),
+        ("usual", "compiled", "nothing recorded, one core"),
         ("usual", "measured", "the same; ours measures Q against Q* after every episode"),
-        ("bare", "compiled", "usual loop over the bare Maze(), without Gymnasium's checks"),
+        ("bare", "compiled", "the rival without Gymnasium's checks"),
         ("bare", "plain", "both in plain Python: q_learning on an environment without a model"),
     )
     return [
-        {
-            "benchmark": f"Q-learning on the Maze, {mine}",
-            "rival": round(best[other], 3),
-            "ours": round(best[mine], 4),
-            "ratio": round(best[other] / best[mine], 1),
-            "unit": UNIT,
-            "note": note,
-        }
+        comparison(
+            f"Q-learning on the Maze, {mine}", RIVALS[other], best[other], best[mine], UNIT, note
+        )
         for other, mine, note in pairs
     ]
 

@@ -22,6 +22,7 @@ from torch import nn
 from torch.distributions import Categorical as TorchCategorical
 from torch.distributions import Normal
 
+from bench.table import comparison
 from rl_core import networks, policies, reinforce
 from rl_core.episodes import CompiledEnvironment
 from rl_core.policies import Gaussian, make_policy
@@ -262,18 +263,6 @@ def best_of(ways: dict[str, Callable[[int], int]], rounds: int) -> dict[str, flo
     return best
 
 
-def row(benchmark: str, rival: float, mine: float, note: str, unit: str = UNIT) -> dict:
-    """One comparison."""
-    return {
-        "benchmark": benchmark,
-        "rival": round(rival, 3),
-        "ours": round(mine, 4),
-        "ratio": round(rival / mine, 1),
-        "unit": unit,
-        "note": note,
-    }
-
-
 def training_rows() -> Iterator[dict]:
     """Whole training, learning included."""
     beginning = (
@@ -288,16 +277,20 @@ def training_rows() -> Iterator[dict]:
         if name == "Acrobot-v1":
             ways["a2c"] = lambda seed, name=name: a2c(name, seed)
         best = best_of(ways, ROUNDS)
-        note = f"usual loop: Gymnasium and torch, one network; ours: 30 seeds; {beginning}"
-        note += f"; {learned_share(name):.0%} of our steps are in finished episodes, learned from"
+        note = (
+            f"rival: one network; ours: 30 seeds; {beginning}; {learned_share(name):.0%} of our "
+            "steps are in finished episodes, learned from"
+        )
         if name != "MountainCarContinuous-v0":
             note += f"; {where_time_goes(name)}"
-        yield row(f"REINFORCE on {name}", best["usual"], best["ours"], note)
+        benchmark = f"REINFORCE on {name}"
+        usual = "usual loop over Gymnasium and torch"
+        yield comparison(benchmark, usual, best["usual"], best["ours"], UNIT, note)
         if name == "Acrobot-v1":
-            note = (
-                f"Stable-Baselines3 A2C, 16 environments, 20,000 steps; ours: 30 seeds; {beginning}"
+            note = f"rival: 16 environments, 20,000 steps; ours: 30 seeds; {beginning}"
+            yield comparison(
+                benchmark, "Stable-Baselines3 A2C", best["a2c"], best["ours"], UNIT, note
             )
-            yield row(f"REINFORCE on {name}", best["a2c"], best["ours"], note)
 
 
 def learner_rows() -> Iterator[dict]:
@@ -306,12 +299,14 @@ def learner_rows() -> Iterator[dict]:
         updates = {"torch": stacked_update(n_networks, n), "ours": compiled_update(n_networks, n)}
         ways = {name: lambda _, update=update: update() for name, update in updates.items()}
         best = best_of(ways, 100)
-        yield row(
-            f"one update of {n_networks} network(s), minibatch {n}",
+        stack = "1 network" if n_networks == 1 else f"{n_networks} networks"
+        yield comparison(
+            f"one update of {stack}, minibatch {n}",
+            "torch, stacked networks",
             best["torch"],
             best["ours"],
-            "torch: stacked with baddbmm, autograd, fused Adam, one thread; widths 6-10-20-3",
             "microseconds a sample",
+            "torch: baddbmm, autograd, fused Adam, one thread; widths 6-10-20-3",
         )
 
 

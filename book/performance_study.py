@@ -84,13 +84,14 @@ def growth_figure(tables: list[pd.DataFrame]) -> Figure:
 
 def bench_figure(bench: pd.DataFrame) -> Figure:
     """How many times as long the rival takes, one bar a comparison."""
-    figure, axes = plt.subplots(figsize=(8.4, 0.42 * len(bench) + 0.9))
+    bench = bench[~bench["unit"].str.startswith("bytes")]
+    figure, axes = plt.subplots(figsize=(8.4, 0.46 * len(bench) + 0.9))
     places = np.arange(len(bench))[::-1]
     axes.barh(places, bench["ratio"], color=BLUE, height=0.65)
     for place, ratio in zip(places, bench["ratio"], strict=True):
         axes.text(ratio * 1.06, place, f"{ratio:g}×", va="center", fontsize=9, color=BLACK)
     axes.axvline(1, color=BLACK, lw=1)
-    axes.set_yticks(places, bench["benchmark"], fontsize=8)
+    axes.set_yticks(places, bench["benchmark"] + "\nagainst " + bench["against"], fontsize=8)
     axes.set_xscale("log")
     axes.set_xlim(0.5, bench["ratio"].max() * 3)
     axes.grid(axis="y", visible=False)

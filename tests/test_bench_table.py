@@ -12,8 +12,8 @@ MEASURED = pd.read_csv(ROOT / "book" / "data" / "bench.csv")
 
 
 def rows(*words: str) -> pd.DataFrame:
-    """The measurements whose names or notes hold all these words."""
-    names = MEASURED["benchmark"] + "; " + MEASURED["note"].fillna("")
+    """The measurements whose names hold all these words."""
+    names = MEASURED["benchmark"] + " against " + MEASURED["against"]
     return MEASURED[[all(word in name for word in words) for name in names]]
 
 
