@@ -249,16 +249,24 @@ def test_the_page_fits_its_window(view, path):
 
 
 CONTRAST = """
-    const channels = colour => colour.match(/[\\d.]+/g).map(Number);
-    const light = ([r, g, b]) => [r, g, b].map(x => x / 255)
+    // Painted and read back: a colour may be written in many ways, color(srgb ...) among them.
+    const canvas = new OffscreenCanvas(1, 1).getContext('2d', {willReadFrequently: true});
+    const channels = colour => {
+      canvas.clearRect(0, 0, 1, 1);
+      canvas.fillStyle = colour;
+      canvas.fillRect(0, 0, 1, 1);
+      const [r, g, b, alpha] = canvas.getImageData(0, 0, 1, 1).data;
+      return [r, g, b, alpha / 255];
+    };
+    const light = rgb => rgb.slice(0, 3).map(x => x / 255)
       .map(x => x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4)
       .reduce((sum, x, i) => sum + x * [0.2126, 0.7152, 0.0722][i], 0);
     const ground = it => {
       for (; it; it = it.parentElement) {
         const colour = channels(getComputedStyle(it).backgroundColor);
-        if (colour.length === 3 || colour[3] === 1) return colour;
+        if (colour[3] === 1) return colour;
       }
-      return [255, 255, 255];
+      return [255, 255, 255, 1];
     };
     const pale = [];
     for (const it of article.querySelectorAll('*')) {
