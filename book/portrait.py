@@ -8,7 +8,13 @@ from pathlib import Path
 
 from chromium import NoBrowserError, open_browser
 
-WIDE = {"width": 1400, "height": 900}  # three pictures in a row beside the contents
+WINDOW = {"width": 1300, "height": 1200}  # all of it in sight at once
+# Four in a row, over the full width and with nothing in front.
+ALONE = """
+    .thumbnails { position: fixed; inset: 0 auto auto 0; z-index: 9999; width: 1300px;
+                  padding: 1rem; grid-template-columns: repeat(4, 1fr);
+                  background: white; box-shadow: 0 0 0 100vmax white; }
+"""
 
 
 def take(page: Path, picture: Path) -> None:
@@ -20,9 +26,10 @@ def take(page: Path, picture: Path) -> None:
         If no browser is installed.
     """
     with open_browser() as browser:
-        context = browser.new_context(viewport=WIDE, color_scheme="light")
+        context = browser.new_context(viewport=WINDOW, color_scheme="light")
         window = context.new_page()
         window.goto(page.resolve().as_uri(), wait_until="load")
+        window.add_style_tag(content=ALONE)
         window.locator(".thumbnails").screenshot(path=picture)
 
 
