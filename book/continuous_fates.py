@@ -1,6 +1,7 @@
 """Chapter 5: what becomes of seeds that do not learn, and how far noise alone gets."""
 
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pandas as pd
@@ -119,6 +120,10 @@ def noise_alone(sigma: float, episodes: int = 100, max_steps: int = 200_000) -> 
         "layer0.weight": np.zeros((2, 1), np.float32),
         "log_sigma": np.full(1, np.log(sigma), np.float32),
     }
-    rng = np.random.default_rng(np.random.SeedSequence(2022))
-    played = [rollout(ENV, settings, weights, rng, max_steps) for _ in range(episodes)]
-    return np.array([len(one.rewards) if one.terminated else np.inf for one in played])
+
+    def play(stream: np.random.SeedSequence) -> float:
+        one = rollout(ENV, settings, weights, np.random.default_rng(stream), max_steps)
+        return len(one.rewards) if one.terminated else np.inf
+
+    with ThreadPoolExecutor(2) as threads:  # compiled episodes do not hold the interpreter's lock
+        return np.array([*threads.map(play, np.random.SeedSequence(2022).spawn(episodes))])

@@ -10,13 +10,14 @@ import numpy as np
 import pandas as pd
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
+from seeds import PREVIEW
 
 from rl_core.figures import BLACK, BLUE, GREY, label
 from rl_core.maze import random_maze
 from rl_core.planning import value_iteration
 from rl_core.reinforce import ReinforceConfig, reinforce
 
-ROUNDS = 3
+ROUNDS = 1 if PREVIEW else 3
 SEED_COUNTS = (1, 2, 4, 8, 16)
 EPISODES = (25, 50, 100, 200, 400)
 SIDES = (12, 40, 125, 395)  # of random mazes with three flags: about 10³ to 10⁶ states

@@ -36,6 +36,8 @@ from rl_core.progress import watching
 from rl_core.store import DamagedResultError, Store, Stored
 from rl_core.workers import Block, Task, run_block, use_threads
 
+LARGEST_BLOCK = 15  # seeds, unless told otherwise
+
 
 class DamagedResultWarning(UserWarning):
     """A stored result was damaged and is made again."""
@@ -92,7 +94,7 @@ def run(
     store: Path | str | Store,
     workers: int = 2,
     backend: str = "loky",
-    block: int = 15,
+    block: int | None = None,
     progress: bool = True,
 ) -> Results:
     """Return the results of every arm with every seed; run only those the store does not have.
@@ -110,8 +112,9 @@ def run(
     backend : str
         A joblib backend: "loky" (local processes), "threading", "dask" (make a Dask `Client`
         first; its cluster sets the number of workers), or any other registered with joblib.
-    block : int
-        Seeds trained as one stack, at most.
+    block : int, optional
+        Seeds trained as one stack, at most. By default 15, or so few that an arm makes two stacks
+        for each of several workers: then none stands idle for long at the end.
     progress : bool
         Whether to show the progress on stderr or in the notebook.
 
@@ -152,6 +155,9 @@ def run(
     """
     arms, seeds = _checked_arms(arms), _checked_seeds(seeds)
     check_integer("workers", workers, least=1)
+    if block is None:
+        shares = 1 if workers == 1 else 2 * workers
+        block = min(LARGEST_BLOCK, -(-len(seeds) // shares))
     check_integer("block", block, least=1)
     if backend not in (allowed := sorted({*BACKENDS, *EXTERNAL_BACKENDS})):
         raise ValueError(f"backend is {backend!r}; allowed are {allowed}")
@@ -276,12 +282,15 @@ def _blocks(tasks: Sequence[Task], folder: Path, size: int) -> list[Block]:
 
 
 def _longest_first(blocks: list[Block], store: Store) -> list[Block]:
-    """Return `blocks` by the time they took when last run, those never run before all others."""
+    """Return `blocks` by the time they took when last run, those never run before all others.
+
+    Nothing is known of those: they stay in the order given.
+    """
     seconds = {_work_of(made): made["seconds"] for made in store.provenances()}
 
-    def expected(block: Block) -> tuple[float, int]:
-        known = seconds.get(_work_of(block.identity), np.inf)
-        return known * len(block.tasks), block.episodes
+    def expected(block: Block) -> float:
+        known: float = seconds.get(_work_of(block.identity), np.inf)
+        return known * len(block.tasks)
 
     return sorted(blocks, key=expected, reverse=True)
 

@@ -111,6 +111,13 @@ def test_blocks_of_any_size_give_the_same_bits(tmp_path, block):
     assert_results_are(results, [PLAIN, BOLD], range(30))
 
 
+@pytest.mark.parametrize(("workers", "sizes"), [(1, [9, 9]), (2, [5, 5, 4, 4]), (20, [1] * 18)])
+def test_several_workers_get_two_blocks_each_of_an_arm(tmp_path, workers, sizes):
+    arguments = {"seeds": range(18), "store": tmp_path, "workers": workers}
+    made = run([PLAIN], backend="threading", **arguments, **quiet).provenance
+    assert made["block_seeds"].tolist() == [n for n in sizes for _ in range(n)]
+
+
 @pytest.mark.parametrize("arm", [BOLD, ACROBOT, CAR, DEEP])
 def test_a_seed_alone_gives_the_bits_it_has_among_thirty(tmp_path, arm):
     thirty = run([arm], seeds=range(30), store=tmp_path / "30", workers=1, block=30, **quiet)
@@ -266,8 +273,8 @@ def test_python_itself_counts(monkeypatch):
 def test_what_takes_longest_goes_first(tmp_path, blocks_run):
     long = Arm("long", learn, "toy", ToyConfig(seconds=0.01), 5)
     short = Arm("short", learn, "toy", ToyConfig(), 40)
-    run([long, short], seeds=[0], store=tmp_path, workers=1, **quiet)
-    assert blocks_run == [("short", (0,)), ("long", (0,))]  # unknown: by episodes
+    run([short, long], seeds=[0], store=tmp_path, workers=1, **quiet)
+    assert blocks_run == [("short", (0,)), ("long", (0,))]  # unknown: as given
     blocks_run.clear()
     new = Arm("new", learn, "toy", ToyConfig(step_size=0.3), 1)
     run([short, long, new], seeds=[0, 1], store=tmp_path, workers=1, **quiet)
