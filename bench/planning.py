@@ -105,7 +105,7 @@ def _memory_row() -> dict:
         MEMORY_LIMIT,
         used["peak"],
         "bytes a state",
-        f"the model takes {used['model']:.1f}",
+        f"the model alone takes {used['model']:.1f} bytes a state",
     )
 
 

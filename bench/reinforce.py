@@ -189,7 +189,7 @@ def where_time_goes(name: str) -> str:
     parts = ", ".join(f"{part} {share / seconds:.0%}" for part, share in shares.items())
     return (
         f"whole training, {len(SEEDS)} seeds x {WHOLE} episodes: {seconds:.0f} s, "
-        f"{steps / 1e6:.0f} million steps, {seconds / steps * 1e6:.2f} us a step ({parts})"
+        f"{steps / 1e6:.0f} million steps, {seconds / steps * 1e6:.2f} µs a step ({parts})"
     )
 
 

@@ -10,10 +10,11 @@ import numpy as np
 import pandas as pd
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 from seeds import PREVIEW
 
 from rl_core.figures import BLACK, BLUE, GREY, label
-from rl_core.maze import random_maze
+from rl_core.maze import Maze, random_maze
 from rl_core.planning import value_iteration
 from rl_core.reinforce import ReinforceConfig, reinforce
 
@@ -54,6 +55,7 @@ def by_episodes() -> pd.DataFrame:
 
 def by_states() -> pd.DataFrame:
     """Seconds of value iteration on random mazes against the number of states."""
+    value_iteration(Maze().model(), gamma=0.99, progress=False)  # compiles
     rows = []
     for side in SIDES:
         rng = np.random.default_rng(side)
@@ -78,6 +80,9 @@ def growth_figure(tables: list[pd.DataFrame]) -> Figure:
         axes.plot(x, y, "o-", color=BLUE)
         axes.set_xscale("log")
         axes.set_yscale("log")
+        if x.max() < 1000:  # else powers of ten do
+            axes.set_xticks(x, x)
+        axes.xaxis.set_minor_formatter(NullFormatter())
         label(axes, x=f"{table.columns[0]} (log scale)", y="seconds (log scale)")
     plt.close(figure)
     return figure
