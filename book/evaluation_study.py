@@ -252,8 +252,8 @@ def summary(policies: pd.DataFrame, name: str) -> pd.DataFrame:
 
     def interval(values: pd.Series, digits: int) -> str:
         numbers = bootstrap_interval(values.to_numpy(), rng=rng)
-        estimate, low, high = (f"{x:,.{digits}f}" for x in numbers)
-        return f"{estimate} [{low}, {high}]".replace("-", "−")
+        estimate, low, high = (f"{x:z,.{digits}f}" for x in numbers)  # z: no -0.0
+        return _minus(f"{estimate} [{low}, {high}]")
 
     digits = 1 if name == "MountainCarContinuous" else 0
     rows = []
