@@ -349,31 +349,8 @@ figures.captioned(details(findings), "Table 4.6. Each criterion with its evidenc
 
 # %% tags=["remove-cell"]
 glue("open", what_it_would_take(findings), display=False)
-share = {
-    (name, variant): curves.share(f"{name}, {variant}")[0]
-    for name in study.ENV
-    for variant in variants
-}
-car = {variant: share["MountainCar", variant] for variant in variants}
-premise(
-    max(car[f"original, {rival}"] for rival in study.RIVALS) <= 0.25,
-    "No single change mends MountainCar.",
-)
-premise(car["original, all four"] >= 0.75, "All four together mend MountainCar.")
-premise(car["shaped"] < car["original, all four"], "Mending does more than shaping.")
-premise(
-    car[study.NO_REPLAY_MENDED] < car["original, all but long memory"],
-    "Replay helps on uniform rewards once the others are mended.",
-)
-premise(share["Acrobot", "original"] > 0.25, "Acrobot's reward is not hopeless as it is.")
-premise(
-    all(
-        share[name, "original, no replay"] <= share[name, "original"]
-        and share[name, study.NO_REPLAY_MENDED] <= share[name, "original, all four"]
-        for name in study.ENV
-    ),
-    "Without replay no more seeds learn, mended or not.",
-)
+for sentence, holds in study.premises(curves).items():
+    premise(sentence, holds)
 
 # %% [markdown]
 # Where a criterion is "open", the interval holds the bound. If estimates stayed what they are, it would take about so many seeds to tell: {glue:text}`open`. (No number: the estimate

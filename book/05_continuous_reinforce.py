@@ -189,7 +189,7 @@ ever = curves.rows["as reported"].groupby("seed")["terminated"].any()
 glue("tries", tries, display=False)
 glue("chance", f"{chance:.0%}", display=False)
 glue("ever", int(ever.sum()), display=False)
-premise(ever.mean() > chance, "the first weights helped more seeds out than noise alone would")
+premise("the first weights helped more seeds out than noise alone would", ever.mean() > chance)
 drawings.escapes(alone, LONGEST)
 
 # %% [markdown]

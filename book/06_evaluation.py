@@ -80,33 +80,11 @@ published = pd.read_csv("data/published.csv")
 glue("n-seeds", len(study.SEEDS), display=False)
 glue("zoo-fewest", int(published["episodes evaluated"].min()), display=False)
 glue("zoo-most", int(published["episodes evaluated"].max()), display=False)
-
-
-def chosen(name, agent, trained, acting):
-    rows = (policies[study.KEY] == [name, agent, trained, acting]).all(axis=1)
-    return policies[rows]
-
-
-for name, key in (
-    ("Acrobot", "acrobot"),
-    ("MountainCar", "car"),
-    ("MountainCarContinuous", "continuous"),
-):
-    free = chosen(name, "REINFORCE", "no limit", "as learned")
-    greedy = chosen(name, "REINFORCE", "no limit", "greedy")
-    under = chosen(name, "REINFORCE", "time limit", "as learned")
-    glue(f"{key}-reached", float(100 * free["terminated"].mean()), display=False)
-    glue(f"{key}-greedy-reached", float(100 * greedy["terminated"].mean()), display=False)
-    glue(f"{key}-in-time", float(100 * free["limited_terminated"].mean()), display=False)
-    glue(f"{key}-under-in-time", float(100 * under["limited_terminated"].mean()), display=False)
-    glue(f"{key}-under-reached", float(100 * under["terminated"].mean()), display=False)
-    for arm, which in (("REINFORCE", "free"), ("REINFORCE, under the limit", "limited")):
-        steps, _ = study.training(results, f"{name}, {arm}")
-        glue(f"{key}-{which}-steps", float(np.median(steps) / 1e6), display=False)
-    if name == "MountainCar":
-        premise(
-            "under its limit MountainCar is not learned", under["limited_terminated"].max() < 0.5
-        )
+for name, key in zip(study.ENV, ("acrobot", "car", "continuous"), strict=True):
+    for what, value in study.reached(policies, results, name).items():
+        glue(f"{key}-{what}", value, display=False)
+under = study.of_agent(policies, "MountainCar", "REINFORCE", "as learned", "time limit")
+premise("under its limit MountainCar is not learned", under["limited_terminated"].max() < 0.5)
 
 # %% [markdown]
 # ## Every agent on every environment

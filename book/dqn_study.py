@@ -8,6 +8,7 @@ changes, were chosen on seeds from 1000 on.
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -427,6 +428,31 @@ def median_seed(curves: Curves, arm: str) -> int:
     steps = curves.at(arm, EPISODES) if reported_arm else curves.steps_a_goal(arm)
     order = np.argsort(steps, kind="stable")
     return int(order[(len(order) - 1) // 2])
+
+
+def premises(curves: Curves) -> dict[str, bool]:
+    """The sentences with which the chapter ends, and whether the shares of seeds bear them out."""
+
+    def share(name: str, variant: str) -> float:
+        return curves.share(f"{name}, {variant}")[0]
+
+    car = partial(share, "MountainCar")
+    alone = max(car(f"original, {rival}") for rival in RIVALS)
+    replayed = [(share(name, "original"), share(name, "original, no replay")) for name in ENV] + [
+        (share(name, "original, all four"), share(name, NO_REPLAY_MENDED)) for name in ENV
+    ]
+    return {
+        "No single change mends MountainCar.": alone <= 0.25,
+        "All four together mend MountainCar.": car("original, all four") >= 0.75,
+        "Mending does more than shaping.": car("shaped") < car("original, all four"),
+        "Replay helps on uniform rewards once the others are mended.": (
+            car(NO_REPLAY_MENDED) < car("original, all but long memory")
+        ),
+        "Acrobot's reward is not hopeless as it is.": share("Acrobot", "original") > 0.25,
+        "Without replay no more seeds learn, mended or not.": all(
+            without <= with_it for with_it, without in replayed
+        ),
+    }
 
 
 def findings(curves: Curves) -> list[Finding]:

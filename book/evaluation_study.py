@@ -271,12 +271,42 @@ def summary(policies: pd.DataFrame, name: str) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def of_agent(
+    policies: pd.DataFrame, name: str, agent: str, acting: str, trained: str = "no limit"
+) -> pd.DataFrame:
+    """The rows of an agent, one a seed."""
+    return policies[(policies[KEY] == [name, agent, trained, acting]).all(axis=1)]
+
+
 def steps_of(
     policies: pd.DataFrame, name: str, agent: str, acting: str, trained: str = "no limit"
 ) -> np.ndarray:
     """Mean steps of every seed of an agent, without limit."""
-    chosen = (policies[KEY] == [name, agent, trained, acting]).all(axis=1)
-    return policies.loc[chosen, "steps"].to_numpy()
+    return of_agent(policies, name, agent, acting, trained)["steps"].to_numpy()
+
+
+def reached(policies: pd.DataFrame, results: Results, name: str) -> dict[str, float]:
+    """What the text quotes of REINFORCE in an environment.
+
+    The share of episodes that get to the goal (%), and what a seed trained (10⁶ steps, median),
+    without the time limit and under it.
+    """
+    free = of_agent(policies, name, "REINFORCE", "as learned")
+    greedily = of_agent(policies, name, "REINFORCE", "greedy")
+    under = of_agent(policies, name, "REINFORCE", "as learned", "time limit")
+    trained = {
+        which: np.median(training(results, f"{name}, {arm}")[0]) / 1e6
+        for which, arm in (("free", "REINFORCE"), ("limited", "REINFORCE, under the limit"))
+    }
+    return {
+        "reached": float(100 * free["terminated"].mean()),
+        "greedy-reached": float(100 * greedily["terminated"].mean()),
+        "in-time": float(100 * free["limited_terminated"].mean()),
+        "under-in-time": float(100 * under["limited_terminated"].mean()),
+        "under-reached": float(100 * under["terminated"].mean()),
+        "free-steps": float(trained["free"]),
+        "limited-steps": float(trained["limited"]),
+    }
 
 
 def optima() -> dict[str, list[Fastest]]:

@@ -38,6 +38,8 @@ def premise(sentence: str, holds: bool, *, preview: bool | None = None) -> None:
 
     Raises
     ------
+    TypeError
+        If `sentence` is none: in the place of `holds` it would always count as true.
     AssertionError
         If they do not.
 
@@ -48,6 +50,8 @@ def premise(sentence: str, holds: bool, *, preview: bool | None = None) -> None:
     Traceback (most recent call last):
     AssertionError: the data do not bear out: One and one is three.
     """
+    if not isinstance(sentence, str):
+        raise TypeError(f"sentence is {sentence!r}; allowed is a str")
     if not holds and not (PREVIEW if preview is None else preview):
         raise AssertionError(f"the data do not bear out: {sentence}")
 

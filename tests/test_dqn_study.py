@@ -102,6 +102,47 @@ def test_claims_are_judged_by_the_arms_they_name(monkeypatch):
     assert (never.low, never.high) == (0, 1)
 
 
+class Shares(dict):
+    """The shares of seeds that learn by arm, as `Curves` tells them."""
+
+    def share(self, arm):
+        """Share of seeds that learn, with an interval that nothing asks for."""
+        return self[arm], 0.0, 1.0
+
+
+BEARING = Shares(
+    dict.fromkeys([arm.name for arm in study.arms()], 0.5)
+    | {f"MountainCar, original, {rival}": 0.1 for rival in study.RIVALS}
+    | {f"{name}, original, all four": 0.9 for name in study.ENV}
+    | {"MountainCar, original, all but long memory": 0.8}
+)
+
+
+@pytest.mark.parametrize(
+    ("arm", "share", "sentence"),
+    [
+        ("MountainCar, original, biases", 0.3, "No single change mends MountainCar."),
+        ("MountainCar, original, all four", 0.7, "All four together mend MountainCar."),
+        ("MountainCar, shaped", 0.95, "Mending does more than shaping."),
+        (
+            "MountainCar, original, all but long memory",
+            0.5,
+            "Replay helps on uniform rewards once the others are mended.",
+        ),
+        ("Acrobot, original, no replay", 0.6, "Without replay no more seeds learn, mended or not."),
+        (
+            f"Acrobot, {study.NO_REPLAY_MENDED}",
+            1.0,
+            "Without replay no more seeds learn, mended or not.",
+        ),
+    ],
+)
+def test_each_of_the_last_sentences_falls_with_its_share(arm, share, sentence):
+    assert all(study.premises(BEARING).values())
+    held = study.premises(Shares(BEARING | {arm: share}))
+    assert [one for one, holds in held.items() if not holds] == [sentence]
+
+
 def test_the_share_of_random_steps_is_that_of_the_actions_taken():
     config = study.mended("MountainCar", ("exploration",))
     assert study.random_share(study.reported("Acrobot"), 0.1) == pytest.approx(0.1)

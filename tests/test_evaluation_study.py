@@ -1,5 +1,7 @@
 """Chapter 6's arms and measures, on made-up evaluations with known answers."""
 
+from types import SimpleNamespace
+
 import evaluation_study as study
 import numpy as np
 import pandas as pd
@@ -118,6 +120,34 @@ def test_the_summary_of_an_environment():
     assert table["steps, no limit"].tolist() == ["130 [120, 140]", "210 [200, 220]"]
     assert table["return within 200 steps"].iloc[0] == "−100 [−100, −100]"
     assert table["reached in time (%)"].tolist() == [50, 50]
+
+
+def test_what_the_text_quotes_of_reinforce():
+    """Shares in percent, training in millions of steps, each from its own agent."""
+    agents = (("no limit", "as learned"), ("no limit", "greedy"), ("time limit", "as learned"))
+    rows = [
+        dict(zip(study.KEY, ("Acrobot", "REINFORCE", *agent), strict=True))
+        | {"seed": seed, "terminated": 0.1 * (i + 1), "limited_terminated": 0.01 * (i + 1)}
+        for i, agent in enumerate(agents)
+        for seed in range(3)
+    ]
+    table = pd.DataFrame(
+        {"arm": f"Acrobot, {arm}", "seed": seed, "env_steps": steps * (seed + 1)}
+        for arm, steps in (("REINFORCE", 1e6), ("REINFORCE, under the limit", 2e6))
+        for seed in range(3)
+    )
+    results = SimpleNamespace(table=table, provenance=table.assign(seconds=1.0))
+    assert study.reached(pd.DataFrame(rows), results, "Acrobot") == pytest.approx(
+        {
+            "reached": 10,
+            "greedy-reached": 20,
+            "in-time": 1,
+            "under-in-time": 3,
+            "under-reached": 30,
+            "free-steps": 2,
+            "limited-steps": 4,
+        }
+    )
 
 
 def test_steps_of_an_agent():
