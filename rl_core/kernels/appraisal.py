@@ -12,11 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from rl_core.compiled import compiled
-from rl_core.mdp import MDP
-from rl_core.plan import optimal_actions
 
 TOLERANCE = 1e-12
 """How far values may still move in a sweep when a policy counts as evaluated."""
@@ -36,7 +34,7 @@ COLUMNS = {
     "eval_return": np.float64,
     "eval_steps": np.float64,
 }
-_STEPS, _RETURN, _TERMINATED, _ENV_STEPS, _VISITED, _NORM, _RMSE, _RMSE_VISITABLE = range(8)
+_STEPS, RETURN, _TERMINATED, _ENV_STEPS, _VISITED, _NORM, _RMSE, _RMSE_VISITABLE = range(8)
 _OPTIMAL, _VALUE_LOST, _EVAL_RETURN, _EVAL_STEPS = range(8, 12)
 
 
@@ -100,6 +98,7 @@ def new_appraisal(yardstick: Yardstick) -> Appraisal:
     Examples
     --------
     >>> from rl_core.maze import Maze
+    >>> from rl_core.q_learning import make_yardstick
     >>> yardstick = make_yardstick(Maze().model(), np.zeros((112, 4)), (112, 4))
     >>> new_appraisal(yardstick).found
     array([-1])
@@ -133,70 +132,6 @@ class Errors(NamedTuple):
     rmse: float
     rmse_visitable: float
     optimal_states: float
-
-
-def make_yardstick(
-    model: MDP | None, Q_star: ArrayLike | None, shape: tuple[int, int]
-) -> Yardstick:
-    """Return the yardstick for tables of a shape.
-
-    Parameters
-    ----------
-    model : MDP or None
-        At least S states (a terminal one may be appended), or None if it is not known.
-    Q_star : array, shape (S, A), or None
-        The optimal action values, or None if they are not known.
-    shape : tuple of int
-        (S, A).
-
-    Raises
-    ------
-    TypeError, ValueError
-        `Q_star` is not made of finite numbers or has another shape.
-
-    Examples
-    --------
-    >>> from rl_core.maze import Maze
-    >>> yardstick = make_yardstick(Maze().model(), np.zeros((112, 4)), (112, 4))
-    >>> yardstick.visitable.sum()
-    np.int64(92)
-    """
-    best = _checked_Q_star(Q_star, shape)
-    optimal = optimal_actions(best) if len(best) else best.astype(np.bool_)
-    if model is None:
-        nowhere = np.empty((0, 0, 0))
-        return Yardstick(
-            best,
-            optimal,
-            np.empty(0, dtype=np.bool_),
-            *(nowhere.astype(np.int32), nowhere, nowhere, np.empty(0, dtype=np.bool_)),
-            *(np.empty(0, dtype=np.int32), np.empty(0)),
-        )
-    return Yardstick(
-        best,
-        optimal,
-        (model.reachable_states() & ~model.terminal)[: shape[0]],
-        *(model.successor, model.probability, model.reward, model.terminal),
-        *(model.start_state, model.start_probability),
-    )
-
-
-def _checked_Q_star(Q_star: ArrayLike | None, shape: tuple[int, int]) -> NDArray[np.float64]:
-    if Q_star is None:
-        return np.empty((0, shape[1]))
-    try:
-        array = np.asarray(Q_star)
-    except ValueError as error:  # ragged nesting
-        raise ValueError(
-            f"Q_star is {Q_star!r}; allowed is an array of shape {shape}, states by actions"
-        ) from error
-    if array.dtype.kind not in "iuf":
-        raise TypeError(f"Q_star has dtype {array.dtype}; allowed are numbers")
-    if array.shape != shape:
-        raise ValueError(f"Q_star has shape {array.shape}; allowed is {shape}, states by actions")
-    if not np.isfinite(array).all():
-        raise ValueError("Q_star has entries that are not finite; allowed are finite numbers")
-    return np.ascontiguousarray(array, dtype=np.float64)
 
 
 def empty_record(n_seeds: int, episodes: int) -> NDArray[np.float64]:
@@ -235,6 +170,12 @@ def env_steps(record: NDArray[np.float64]) -> int:
 
 
 @compiled
+def steps_so_far(record: NDArray[np.float64], k: int) -> int:
+    """Return the environment steps of one seed before episode k (from 0)."""
+    return int(record[k - 1, _ENV_STEPS]) if k > 0 else 0
+
+
+@compiled
 def write_episode(
     record: NDArray[np.float64],
     k: int,
@@ -247,7 +188,7 @@ def write_episode(
     `outcome` is the episode's steps, return, whether it terminated, and newly visited entries.
     """
     row = record[k]
-    row[_STEPS], row[_RETURN], row[_TERMINATED], row[_VISITED] = outcome
+    row[_STEPS], row[RETURN], row[_TERMINATED], row[_VISITED] = outcome
     row[_ENV_STEPS] = row[_STEPS]
     if k > 0:
         row[_ENV_STEPS] += record[k - 1, _ENV_STEPS]
@@ -285,6 +226,7 @@ def errors(Q: NDArray[np.float64], yardstick: Yardstick) -> Errors:
     Examples
     --------
     >>> from rl_core.maze import Maze
+    >>> from rl_core.q_learning import make_yardstick
     >>> yardstick = make_yardstick(Maze().model(), np.ones((112, 4)), (112, 4))
     >>> errors(np.zeros((112, 4)), yardstick).rmse
     1.0
@@ -338,6 +280,7 @@ def value_lost(
     --------
     >>> from rl_core.maze import Maze
     >>> from rl_core.planning import value_iteration
+    >>> from rl_core.q_learning import make_yardstick
     >>> model = Maze().model()
     >>> Q_star = value_iteration(model, gamma=0.9, tolerance=1e-10).Q
     >>> yardstick = make_yardstick(model, Q_star, Q_star.shape)

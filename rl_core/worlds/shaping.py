@@ -9,9 +9,6 @@ potentials, so the best policy under them need not be the best under the origina
 Harada and Russell 1999, Policy invariance under reward transformations).
 """
 
-import hashlib
-import importlib
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
@@ -21,10 +18,11 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from rl_core import sources
-from rl_core.policies import require
+from rl_core.compiled import compiled
+from rl_core.imports import code_behind, imported
 
-Shape = Callable[[NDArray[np.float32], float], float]
+ORIGINAL = "rl_core.worlds.shaping:original"
+"""The environment's own reward."""
 
 _SIGNATURE = types.float64(types.Array(types.float32, 1, "C"), types.float64)
 
@@ -95,26 +93,24 @@ class Shaping:
 
     Examples
     --------
-    >>> Shaping("rl_core.shaping:tip_height").function
-    'rl_core.shaping:tip_height'
+    >>> Shaping("rl_core.worlds.shaping:tip_height").function
+    'rl_core.worlds.shaping:tip_height'
     """
 
     function: str
     code: str = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        allowed = "'module:name' of a function f(observation, reward) -> float that numba compiles"
-        require(isinstance(self.function, str), "shaping", self.function, allowed)
-        module, _, name = self.function.partition(":")
+        imported("shaping", self.function)
         try:
             compiled_shape(self.function)
-        except (ImportError, AttributeError, TypeError, ValueError, numba.NumbaError) as error:
-            reason = str(error).strip().splitlines()[0] if str(error).strip() else name
+        except (AttributeError, TypeError, ValueError, numba.NumbaError) as error:
+            reason = str(error).strip().splitlines()[0] if str(error).strip() else "no reason given"
             raise ValueError(
-                f"shaping must be {allowed}, got {self.function!r} ({reason})"
+                "shaping must name a function f(observation, reward) -> float that numba compiles, "
+                f"got {self.function!r} ({reason})"
             ) from error
-        found = repr(sorted(sources.code([module]).items()))
-        object.__setattr__(self, "code", hashlib.sha256(found.encode()).hexdigest())
+        object.__setattr__(self, "code", code_behind(self.function))
 
 
 @cache
@@ -123,6 +119,17 @@ def compiled_shape(function: str) -> Any:
 
     Every shape has the same type, so that no kernel has to be compiled anew for another one.
     """
-    module, _, name = function.partition(":")
-    python_function = getattr(importlib.import_module(module), name)
-    return numba.cfunc(_SIGNATURE)(python_function)
+    return numba.cfunc(_SIGNATURE)(imported("shaping", function))
+
+
+@compiled
+def shaped_reward(shape: Any, observation: NDArray[np.float32], reward: float) -> float:
+    """Return what a compiled shape makes of a reward and the observation that came with it.
+
+    Examples
+    --------
+    >>> shape = compiled_shape("rl_core.worlds.shaping:tip_height")
+    >>> shaped_reward(shape, np.array([1, 0, 1, 0, 0, 0], np.float32), -1.0)
+    -2.0
+    """
+    return float(shape(observation, reward))

@@ -9,15 +9,15 @@ action becomes one of a few levels, evenly spaced from its lower to its upper bo
 the cell only. Below the surface the world stays what it was: two states in one cell may behave
 differently, so that the cells are no Markov states, and a table can only be an approximation.
 
-`Discretised` does this to any Gymnasium environment. `Binned` is the same for the compiled tasks of
-`rl_core.dynamics`, without their time limits, and gives the same cells and rewards.
+`Discretised` does this to any Gymnasium environment. `GriddedTask` is the same for a compiled task
+(`rl_core.worlds.tasks`), and gives the same cells and rewards.
 
 Source: R. S. Sutton and A. G. Barto, Reinforcement Learning: An Introduction (2018), section 9.3
 and 9.5.3 (state aggregation; a single tiling).
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -26,10 +26,11 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from rl_core import dynamics
+from rl_core.checks import floats, instance, integer, integers, require
 from rl_core.compiled import compiled
-from rl_core.episodes import make_environment
-from rl_core.policies import is_integer, require
+from rl_core.worlds.environments import EnvironmentLike, opened
+from rl_core.worlds.names import find
+from rl_core.worlds.tasks import Kernel, Task, twin
 
 MAX_CELLS = 2**31 - 1
 
@@ -91,18 +92,31 @@ def make_grid(
     d = math.prod(space.shape)
     bounds = []
     for name, given, own in (("low", low, space.low), ("high", high, space.high)):
-        bound = np.array(own if given is None else given, np.float64).ravel()
-        require(bound.size == d, name, given, f"{d} numbers, one a dimension")
+        bound = floats(name, np.ravel(own if given is None else given), (d,), finite=False)
         finite = bool(np.isfinite(bound).all())
         require(finite, name, bound.tolist(), "finite in every dimension; give bounds to use")
         bounds.append(bound)
     require(bool((bounds[0] < bounds[1]).all()), "low", bounds[0].tolist(), "below high")
-    numbers = tuple(bins) if isinstance(bins, Sequence) else (bins,) * d
-    valid = len(numbers) == d and all(is_integer(n, 1) for n in numbers)
-    require(valid, "bins", bins, f"a positive integer, or {d} of them")
-    cells = math.prod(int(n) for n in numbers)
+    numbers = checked_bins("bins", bins)
+    numbers = (numbers,) * d if isinstance(numbers, int) else numbers
+    require(len(numbers) == d, "bins", bins, f"a positive integer, or {d} of them")
+    cells = math.prod(numbers)
     require(cells <= MAX_CELLS, "bins", bins, f"such that there are at most {MAX_CELLS} cells")
     return Grid(bounds[0], bounds[1], np.array(numbers, np.int64))
+
+
+def checked_bins(name: str, bins: object) -> int | tuple[int, ...]:
+    """Return a number of bins, or a tuple of them, each at least 1.
+
+    Examples
+    --------
+    >>> checked_bins("bins", [10, 20])
+    (10, 20)
+    """
+    if isinstance(bins, Sequence | np.ndarray) and not isinstance(bins, str):
+        require(len(bins) > 0, name, bins, "a positive integer, or one a dimension")
+        return integers(name, bins, 1)
+    return integer(name, bins, 1)
 
 
 @compiled
@@ -156,8 +170,8 @@ def action_levels(space: spaces.Space[Any], levels: int | None) -> NDArray[np.fl
     low, high = space.low.ravel(), space.high.ravel()
     bounded = bool(np.isfinite(low).all() and np.isfinite(high).all())
     require(bounded, "env's action space", space, "bounded")
-    require(is_integer(levels, 2), "levels", levels, "an integer from 2 where actions are a Box")
-    assert levels is not None
+    require(levels is not None, "levels", levels, "an integer from 2 where actions are a Box")
+    levels = integer("levels", levels, 2)
     ticks = [np.linspace(a, b, levels) for a, b in zip(low, high, strict=True)]
     return np.array(list(product(*ticks)), np.float32)
 
@@ -195,16 +209,14 @@ class Discretised(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     def __init__(
         self,
-        env: str | gymnasium.Env[Any, Any] | Callable[[], gymnasium.Env[Any, Any]],
+        env: EnvironmentLike,
         bins: int | Sequence[int],
         *,
         levels: int | None = None,
         low: ArrayLike | None = None,
         high: ArrayLike | None = None,
     ) -> None:
-        made = make_environment(env) if isinstance(env, str) else env() if callable(env) else env
-        if not isinstance(made, gymnasium.Env):
-            raise TypeError(f"env must be an id, an environment or a function, got {env!r}")
+        made = opened(env)
         self.grid = make_grid(made.observation_space, bins, low=low, high=high)
         self.levels = action_levels(made.action_space, levels)
         self._native = made.action_space
@@ -230,30 +242,38 @@ class Discretised(gymnasium.Wrapper[Any, Any, Any, Any]):
         return self._cell(observation), float(reward), terminated, truncated, info
 
     def _cell(self, observation: Any) -> int:
-        return int(cell(self.grid, np.ravel(observation).astype(np.float32)))
+        """Number the cell; compiled code relies on the observation's size."""
+        flat = np.ravel(observation)
+        fits = flat.size == self.grid.bins.size and flat.dtype.kind in "fiub"
+        if not fits or np.isnan(flat).any():
+            raise ValueError(
+                f"env must keep to its spaces: from {self.env}, the observation {observation!r} came, "
+                f"which has no cell; its observation space is {self.env.observation_space}"
+            )
+        return int(cell(self.grid, flat.astype(np.float32)))
 
 
-class Binned(NamedTuple):
+class GriddedTask(NamedTuple):
     """A compiled task seen through a grid: what `Discretised` makes of it, without time limit.
 
     Attributes
     ----------
-    code : int
-        The task; see `rl_core.dynamics`.
+    kernel : Kernel
+        The task, with its state.
     grid : Grid
-    actions : float32 array of shape (n_actions, 1)
-        What `rl_core.dynamics.step` takes.
-    state : float64 array of shape (4,)
-        Where the task is; overwritten.
+    actions : float32 array of shape (n_actions, width)
+        What the task's `step` takes.
     observation : float32 array of shape (d,)
         What would be seen of it; overwritten.
+    max_steps : int
+        The task's own time limit; 0 where it has none.
     """
 
-    code: int
+    kernel: Kernel
     grid: Grid
     actions: NDArray[np.float32]
-    state: NDArray[np.float64]
     observation: NDArray[np.float32]
+    max_steps: int
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -261,54 +281,63 @@ class Binned(NamedTuple):
         return self.grid.n_cells, len(self.actions)
 
 
-def binned(env: str, bins: int | Sequence[int], *, levels: int | None = None) -> Binned:
+def gridded(
+    env: str | Task, bins: int | Sequence[int], *, levels: int | None = None
+) -> GriddedTask:
     """Lay a grid over a compiled task.
 
     Parameters
     ----------
-    env : str
-        One of `rl_core.dynamics.TASKS`.
+    env : str or Task
+        An id of `rl_core.worlds.tasks.TASKS`, the import path of a task, or a task.
     bins, levels
         As for `Discretised`.
 
     Raises
     ------
-    ValueError
+    TypeError, ValueError
         If an argument is not as described.
 
     Examples
     --------
-    >>> binned("MountainCar-v0", bins=10).shape
+    >>> gridded("MountainCar-v0", bins=10).shape
     (100, 3)
     """
-    require(env in dynamics.TASKS, "env", env, f"one of {sorted(dynamics.TASKS)}")
-    task = dynamics.TASKS[env]
-    with gymnasium.make(env) as made:
-        grid = make_grid(made.observation_space, bins)
-        actions = action_levels(made.action_space, levels)
-    return Binned(task.code, grid, actions, np.zeros(4), np.zeros(task.n_observations, np.float32))
+    task = task_of(env)
+    instance("env", env if task is None else task, Task, "a compiled task")
+    assert task is not None
+    grid = make_grid(task.observation_space, bins)
+    actions = action_levels(task.action_space, levels)
+    seen = np.zeros(task.n_observations, np.float32)
+    return GriddedTask(task.kernel(), grid, actions, seen, task.max_episode_steps or 0)
+
+
+def task_of(env: object) -> Task | None:
+    """Return the compiled task that `env` is or names, if there is one.
+
+    Examples
+    --------
+    >>> task_of("FrozenLake-v1") is None
+    True
+    """
+    found = (twin(env) or find(env)) if isinstance(env, str) else env
+    return found if isinstance(found, Task) else None
 
 
 @compiled
-def start_binned(world: Binned, rng: np.random.Generator) -> int:
+def start_gridded(world: GriddedTask, rng: np.random.Generator) -> int:
     """Draw the start of an episode as the environment's `reset` does; return its cell.
 
     The acrobot's first observation is here rounded as compiled code rounds a cosine, which may
     differ from numpy's in the last bit.
     """
-    world.state[:] = 0.0
-    if world.code == dynamics.ACROBOT:
-        for i in range(4):
-            world.state[i] = np.float32(rng.uniform(-0.1, 0.1))
-    else:
-        world.state[0] = rng.uniform(-0.6, -0.4)
-    dynamics.observe(world.code, world.state, world.observation)
+    world.kernel.start(rng, world.kernel.state, world.observation)
     return cell(world.grid, world.observation)
 
 
 @compiled
-def step_binned(world: Binned, a: int) -> tuple[int, float, bool]:
+def step_gridded(world: GriddedTask, a: int) -> tuple[int, float, bool]:
     """Take action number a; return the next cell, the reward, and whether the goal is reached."""
-    reward, terminated = dynamics.step(world.code, world.state, world.actions[a])
-    dynamics.observe(world.code, world.state, world.observation)
+    reward, terminated = world.kernel.step(world.kernel.state, world.actions[a])
+    world.kernel.observe(world.kernel.state, world.observation)
     return cell(world.grid, world.observation), reward, terminated

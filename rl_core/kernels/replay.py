@@ -5,7 +5,7 @@ is drawn with replacement, each from all transitions held with the same probabil
 
 Beside each transition stands a cache: V = max_a' Q(s', a') under a fixed network, which changes
 only when the network is copied. So V is computed when a transition is first sampled after a copy,
-and read from then on (`rl_core.q_update`). That gives the same numbers for less work.
+and read from then on (`rl_core.kernels.q_update`). That gives the same numbers for less work.
 
 Source: L.-J. Lin (1992), Self-improving reactive agents based on reinforcement learning, planning
 and teaching.

@@ -1,7 +1,7 @@
 """Worlds of finitely many states and actions, to be acted in one step at a time.
 
 There are three kinds, with the same two verbs, `start` and `step`: an `MDP`, as arrays that
-compiled code steps through (`Model`), a compiled task seen through a grid (`Binned`), and any
+compiled code steps through (`Model`), a compiled task seen through a grid (`GriddedTask`), and any
 discrete Gymnasium environment (`Played`). Given equal streams, an environment and its model behave
 alike. A loop written with these verbs is plain Python for all kinds, and can be compiled for the
 first two.
@@ -10,6 +10,7 @@ first two.
 from __future__ import annotations
 
 from collections.abc import Callable
+from operator import index
 from typing import Any, NamedTuple
 
 import gymnasium as gym
@@ -19,14 +20,12 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from rl_core.compiled import compiled
-from rl_core.discretise import Binned, start_binned, step_binned
 from rl_core.mdp import MDP
+from rl_core.worlds.discretise import GriddedTask, start_gridded, step_gridded
+from rl_core.worlds.environments import EnvironmentLike, checked_reward, opened
 
-Environment = str | gym.Env[Any, Any] | Callable[[], gym.Env[Any, Any]]
-"""An id, an environment, or a function that makes one."""
 
-
-class Streams(NamedTuple):
+class Draws(NamedTuple):
     """The random numbers of an agent in a world.
 
     Start states have a stream of their own, so that it does not matter to the transitions how many
@@ -38,22 +37,22 @@ class Streams(NamedTuple):
     policy: np.random.Generator
 
 
-def spawn_streams(seed: int, n: int) -> list[Streams]:
-    """Spawn n independent sets of streams from `SeedSequence(seed)`.
+def spawn_draws(seed: int, n: int) -> list[Draws]:
+    """Spawn n independent sets of draws from `SeedSequence(seed)`.
 
     Each generator is the one that an environment's `reset(seed=number)` makes from the number
     drawn for it.
 
     Examples
     --------
-    >>> learning, evaluation = spawn_streams(0, 2)
+    >>> learning, evaluation = spawn_draws(0, 2)
     >>> learning.step.random() != evaluation.step.random()
     True
     """
     children = np.random.SeedSequence(seed).spawn(3 * n)
     numbers = [int(child.generate_state(1, np.uint64)[0]) for child in children]
     generators = [np.random.default_rng(number) for number in numbers]
-    return [Streams(*generators[3 * i : 3 * i + 3]) for i in range(n)]
+    return [Draws(*generators[3 * i : 3 * i + 3]) for i in range(n)]
 
 
 class Model(NamedTuple):
@@ -102,40 +101,28 @@ class Played(NamedTuple):
     actions: spaces.Discrete[Any]
 
 
-def played(env: Environment) -> Played:
-    """Make an environment, unless it is one already, and check that it is discrete.
+def played(env: EnvironmentLike) -> Played:
+    """Open an environment, unless it is one already, and check that it is discrete.
 
     Raises
     ------
-    TypeError
-        `env` is neither an environment nor an id nor a function that makes one.
-    ValueError
-        Gymnasium does not know the id, or a space is not Discrete.
+    TypeError, ValueError
+        There is no such environment (`rl_core.worlds.environments.opened`), or a space is not
+        Discrete.
 
     Examples
     --------
     >>> played("MountainCar-v0")
     Traceback (most recent call last):
-    ValueError: env has the observation space Box([-1.2  -0.07], [0.6  0.07], (2,), float32); ...
+    ValueError: env must have a Discrete observation space, got Box([-1.2  -0.07], [0.6  0.07], ...
     """
-    made: object
-    if isinstance(env, str):
-        try:
-            made = gym.make(env)
-        except gym.error.Error as error:
-            raise ValueError(
-                f"env is {env!r}; allowed are ids that Gymnasium knows ({error})"
-            ) from error
-    else:
-        made = env() if callable(env) else env
-    if not isinstance(made, gym.Env):
-        raise TypeError(
-            f"env is {env!r}; allowed is an MDP, a gymnasium.Env, an id, or a function making one"
-        )
+    made = opened(env)
     observations, actions = made.observation_space, made.action_space
     for name, space in (("observation", observations), ("action", actions)):
         if not isinstance(space, spaces.Discrete):
-            raise ValueError(f"env has the {name} space {space}; allowed is a Discrete space")
+            if made is not env:
+                made.close()
+            raise ValueError(f"env must have a Discrete {name} space, got {space}")
     assert isinstance(observations, spaces.Discrete)
     assert isinstance(actions, spaces.Discrete)
     return Played(made, observations, actions)
@@ -157,67 +144,45 @@ def known_model(world: Played) -> MDP | None:
     return model if model.n_states in (n_states, n_states + 1) else None
 
 
-World = Model | Binned | Played
+DiscreteWorld = Model | GriddedTask | Played
 
 
-def opened(env: Environment | MDP | Binned) -> tuple[World, MDP | None, tuple[int, int]]:
-    """Return the world to act in, its model if it has one, and its numbers of states and actions.
-
-    Raises
-    ------
-    TypeError, ValueError
-        See `played`.
-
-    Examples
-    --------
-    >>> world, model, shape = opened("FrozenLake-v1")
-    >>> type(world).__name__, shape
-    ('Played', (16, 4))
-    """
-    if isinstance(env, MDP):
-        return model_arrays(env), env, (env.n_states, env.n_actions)
-    if isinstance(env, Binned):
-        return env, None, env.shape
-    world = played(env)
-    return world, known_model(world), (int(world.observations.n), int(world.actions.n))
-
-
-def start(world: World, streams: Streams) -> int:
+def start(world: DiscreteWorld, draws: Draws) -> int:
     """Begin an episode; return its start state."""
     if isinstance(world, Played):
-        return _start_in_env(world, streams)
-    if isinstance(world, Binned):
-        return start_binned(world, streams.start)
-    return _start_on_model(world, streams)
+        return _start_in_env(world, draws)
+    if isinstance(world, GriddedTask):
+        return start_gridded(world, draws.start)
+    return _start_on_model(world, draws)
 
 
-def step(world: World, s: int, a: int, streams: Streams) -> tuple[int, float, bool, bool]:
+def step(world: DiscreteWorld, s: int, a: int, draws: Draws) -> tuple[int, float, bool, bool]:
     """Take action a in the current state s; return s', r, terminated, truncated."""
     if isinstance(world, Played):
         return _step_in_env(world, a)
-    if isinstance(world, Binned):
+    if isinstance(world, GriddedTask):
         return _step_in_grid(world, a)
-    return _step_on_model(world, s, a, streams)
+    return _step_on_model(world, s, a, draws)
 
 
 @compiled
-def _start_on_model(model: Model, streams: Streams) -> int:
+def _start_on_model(model: Model, draws: Draws) -> int:
     """Draw a start state by one uniform."""
-    return int(model.start_state[_slot(model.start_cumulative, streams.start.random())])
+    return int(model.start_state[_slot(model.start_cumulative, draws.start.random())])
 
 
 @compiled
-def _step_on_model(model: Model, s: int, a: int, streams: Streams) -> tuple[int, float, bool, bool]:
+def _step_on_model(model: Model, s: int, a: int, draws: Draws) -> tuple[int, float, bool, bool]:
     """Draw s' and r by one uniform. A terminal s' terminates; nothing truncates."""
-    k = _slot(model.cumulative[s, a], streams.step.random())
+    k = _slot(model.cumulative[s, a], draws.step.random())
     s_next = int(model.successor[s, a, k])
     return s_next, float(model.reward[s, a, k]), bool(model.terminal[s_next]), False
 
 
 @compiled
-def _step_in_grid(world: Binned, a: int) -> tuple[int, float, bool, bool]:
+def _step_in_grid(world: GriddedTask, a: int) -> tuple[int, float, bool, bool]:
     """Take a step; nothing truncates."""
-    s_next, r, terminated = step_binned(world, a)
+    s_next, r, terminated = step_gridded(world, a)
     return s_next, r, terminated, False
 
 
@@ -232,26 +197,45 @@ def _slot(cumulative: NDArray[np.float64], u: float) -> int:
 
 # What the verbs mean in compiled code is decided by the type of the world.
 _starts: dict[type, Callable[..., int]] = {
-    Model: lambda world, streams: _start_on_model(world, streams),
-    Binned: lambda world, streams: start_binned(world, streams.start),
+    Model: lambda world, draws: _start_on_model(world, draws),
+    GriddedTask: lambda world, draws: start_gridded(world, draws.start),
 }
 _steps: dict[type, Callable[..., tuple[int, float, bool, bool]]] = {
-    Model: lambda world, s, a, streams: _step_on_model(world, s, a, streams),
-    Binned: lambda world, s, a, streams: _step_in_grid(world, a),
+    Model: lambda world, s, a, draws: _step_on_model(world, s, a, draws),
+    GriddedTask: lambda world, s, a, draws: _step_in_grid(world, a),
 }
-overload(start)(lambda world, streams: _starts[world.instance_class])
-overload(step)(lambda world, s, a, streams: _steps[world.instance_class])
+overload(start)(lambda world, draws: _starts[world.instance_class])
+overload(step)(lambda world, s, a, draws: _steps[world.instance_class])
 
 
-def _start_in_env(world: Played, streams: Streams) -> int:
-    """Reset the environment; the streams take the place of its own generator."""
+def _start_in_env(world: Played, draws: Draws) -> int:
+    """Reset the environment; the draws take the place of its own generator."""
     base = world.env.unwrapped
-    base.np_random = streams.start
+    base.np_random = draws.start
     observation, _ = world.env.reset()
-    base.np_random = streams.step
-    return int(observation - world.observations.start)
+    base.np_random = draws.step
+    return _state(world, observation)
 
 
 def _step_in_env(world: Played, a: int) -> tuple[int, float, bool, bool]:
     observation, r, terminated, truncated, _ = world.env.step(int(a + world.actions.start))
-    return int(observation - world.observations.start), float(r), bool(terminated), bool(truncated)
+    return (
+        _state(world, observation),
+        checked_reward(world.env, r),
+        bool(terminated),
+        bool(truncated),
+    )
+
+
+def _state(world: Played, observation: Any) -> int:
+    """Return a state's number, counted from 0; tables are indexed with it in compiled code."""
+    try:
+        state = index(observation) - int(world.observations.start)
+    except TypeError:
+        state = -1
+    if not 0 <= state < world.observations.n:
+        raise ValueError(
+            f"env must keep to its spaces: from {world.env}, the observation {observation!r} came; "
+            f"its observation space is {world.observations}"
+        )
+    return state

@@ -10,24 +10,18 @@ weights and biases by name.
 
 Every function works on one row alone, in compiled loops with strict floating point. A network
 therefore gets the same bits whether it is trained alone or beside others, with batches of whatever
-lengths and any number of threads. The same stacked in torch (baddbmm, autograd, fused Adam) takes
-two to three times as long for thirty networks of widths 6-10-20-3, and ten times as long for one:
-`bench/reinforce.py` measures it. torch remains the reference: the tests compare outputs, gradients
-and optimisers with it, and `to_torch` hands a network over.
+lengths and any number of threads. `bench/reinforce.py` measures it beside torch; the tests hold
+outputs, gradients and optimisers to torch (`rl_core.modules`).
 """
 
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rl_core.compiled import compiled
-
-if TYPE_CHECKING:
-    import torch
 
 LANES = 32
 """Batches are computed in multiples of this many samples; `padded` says how many."""
@@ -158,29 +152,6 @@ def trainable_mask(sizes: Sequence[int], biases: bool) -> NDArray[np.float32]:
             if name.endswith("bias"):
                 view[...] = 0.0
     return mask
-
-
-def to_torch(sizes: Sequence[int], parameters: NDArray[np.float32]) -> "torch.nn.Sequential":
-    """Build the same network as a torch module, with a copy of its parameters.
-
-    Linear layers alternate with rectified linear units.
-
-    Examples
-    --------
-    >>> to_torch((2, 4, 1), np.zeros(17, np.float32))[0].in_features
-    2
-    """
-    import torch  # here, because nothing else in the package needs it: it takes a second to load
-
-    layers = {name: torch.from_numpy(v.copy()) for name, v in unpack(sizes, parameters).items()}
-    modules: list[torch.nn.Module] = []
-    for layer, (n_in, n_out) in enumerate(pairwise(sizes)):
-        # On the device "meta" nothing is drawn from torch's global generator.
-        linear = torch.nn.Linear(n_in, n_out, device="meta")
-        linear.weight = torch.nn.Parameter(layers[f"layer{layer}.weight"].T.contiguous())
-        linear.bias = torch.nn.Parameter(layers[f"layer{layer}.bias"])
-        modules += [linear, torch.nn.ReLU()]
-    return torch.nn.Sequential(*modules[:-1])
 
 
 def output(
