@@ -11,14 +11,14 @@ NOTEBOOKS := $(sort $(wildcard book/[0-9]*.ipynb)) $(sort $(wildcard book/a[0-9]
 SITE := _build/html
 # The setting the site was built with is part of the stamp's name: a preview is never taken for the book.
 STAMP := $(SITE)/.complete-$(or $(SEEDS),30)-seeds
-BOOK_SOURCES := _config.yml _toc.yml environment.txt $(wildcard book/*.md book/*.py book/_static/*) \
+BOOK_SOURCES := _config.yml _toc.yml environment.txt $(wildcard book/*.md book/*.py book/*/*.py book/_static/*) \
 	$(NOTEBOOKS) $(shell find rl_core book/data -type f -not -path '*/__pycache__/*' 2>/dev/null)
 
 # `make book SEEDS=3` is a first look with fewer seeds; no other target takes the setting.
 unexport SEEDS
 PREVIEW := $(if $(filter-out 30,$(SEEDS)),_build/preview)
 ifneq ($(SEEDS),)
-PROBLEM := $(shell SEEDS='$(SEEDS)' "$(PYTHON)" book/seeds.py 2>&1 | tail -n 1)
+PROBLEM := $(shell SEEDS='$(SEEDS)' "$(PYTHON)" book/report/seeds.py 2>&1 | tail -n 1)
 ifneq ($(PROBLEM),)
 $(error $(PROBLEM))
 endif
@@ -70,10 +70,10 @@ pdf: _build/book.pdf ## print the book to one file, _build/book.pdf (needs Chrom
 _build/book.pdf: $(STAMP)
 	SEEDS=$(SEEDS) $(BIN)/jupyter-book build $(or $(PREVIEW),.) --path-output . --builder singlehtml
 	@cp _build/singlehtml/book/intro.html _build/singlehtml/printed.html
-	$(BIN)/python book/paper.py _build/singlehtml/printed.html $@
+	PYTHONPATH=book $(BIN)/python -m web.paper _build/singlehtml/printed.html $@
 
 picture: $(STAMP) ## take the README's picture from the built front page (needs Chromium)
-	$(BIN)/python book/portrait.py $(SITE)/book/intro.html .github/readme.png
+	PYTHONPATH=book $(BIN)/python -m web.portrait $(SITE)/book/intro.html .github/readme.png
 
 test: lint types unit pairing notebooks browser ## all that has to pass: style, types, tests, notebooks, pages
 

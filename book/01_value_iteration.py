@@ -26,17 +26,19 @@
 from pathlib import Path
 
 import pandas as pd
-import planning_figures as drawings
-import planning_study as study
-from figure_data import offer
 from myst_nb import glue
 
-from rl_core import figures, maze_figures
-from rl_core.claims import details, record, verdicts
+from drawings import look
+from drawings import maze as maze_drawings
+from drawings import planning as drawings
+from report.captions import captioned
+from report.claims import details, record, verdicts
+from report.figure_data import offer
 from rl_core.maze import Maze
 from rl_core.planning import q_value_iteration, value_iteration
+from studies import planning as study
 
-figures.use_style()
+look.use_style()
 RESULTS = Path("../results")
 RESULTS.mkdir(exist_ok=True)
 
@@ -102,7 +104,7 @@ plan.table.tail(3)
 # %% tags=["hide-input"]
 q_values = study.q_value_table(maze, plan.Q)
 for number, flags in enumerate(maze.flag_sets, start=1):
-    figure = maze_figures.situation_figure(maze, plan.Q, flags)
+    figure = maze_drawings.situation_figure(maze, plan.Q, flags)
     glue(f"fig-{number}", figure, display=False)
     offer(f"figure_{number}", study.decisions(q_values[q_values["flags"] == (flags or "none")]))
 
@@ -191,13 +193,13 @@ for number, flags in enumerate(maze.flag_sets, start=1):
 # environment (environment seeds 0, 1 and 2, not picked).
 
 # %% tags=["hide-input"]
-straight = maze_figures.follow_policy(Maze(slip=0), plan.policy, seed=0)
+straight = maze_drawings.follow_policy(Maze(slip=0), plan.policy, seed=0)
 glue("route", study.route(maze, straight), display=False)
 frames = []
 for seed in range(3):
-    moves = maze_figures.follow_policy(maze, plan.policy, seed=seed)
-    frames += maze_figures.episode_frames(maze, moves)
-figures.Film(
+    moves = maze_drawings.follow_policy(maze, plan.policy, seed=seed)
+    frames += maze_drawings.episode_frames(maze, moves)
+look.Film(
     frames,
     frames_per_second=12,
     description="The optimal agent walks through the maze in three episodes, collects flags and "
@@ -218,7 +220,7 @@ figures.Film(
 
 # %% tags=["hide-input"]
 q_values.to_csv(RESULTS / "maze_q_values.csv", index=False)
-figures.captioned(
+captioned(
     q_values[q_values["flags"].isin(["none", "ABC"]) & q_values["row"].isin([0, 1])],
     "Table 1.1. Action values with no flag and with all flags, upper two rows of the maze. The "
     "largest of each state is bold; the goal is terminal, its rows are zero.",
@@ -261,7 +263,7 @@ drawings.convergence(plan.table, gamma=study.GAMMA, threshold=study.THRESHOLD)
 # their number.
 
 # %% tags=["hide-input"]
-figures.captioned(
+captioned(
     study.costs(model),
     "Table 1.2. What it takes to find the Maze's values to within 1e-10. A linear solve is not made "
     "of backups; its price shows in the time (median of 20 runs on the machine that built this page).",
@@ -347,16 +349,16 @@ for cost in ("round_cost", "whole_cost"):
 #
 # ## Verdicts
 #
-# The criteria were fixed in code (`book/planning_study.py`) before the measurements were made. What holds for
+# The criteria were fixed in code (`book/studies/planning.py`) before the measurements were made. What holds for
 # the Maze is exact; the intervals are 95% bootstrap intervals over the {glue:text}`seeds` random mazes.
 
 # %%
 findings = study.findings(course, sample)
 record(findings, RESULTS, chapter="1")
-figures.captioned(verdicts(findings), "Table 1.3. The report's claims about planning.")
+captioned(verdicts(findings), "Table 1.3. The report's claims about planning.")
 
 # %% tags=["hide-input"]
-figures.captioned(
+captioned(
     details(findings),
     "Table 1.4. Each criterion with its evidence. Seeds: number of random mazes; 0 where nothing is random.",
 )

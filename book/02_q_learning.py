@@ -29,19 +29,20 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import provenance
-import q_learning_figures as drawings
-import q_learning_study as study
-from figure_data import offer, tidy
 from myst_nb import glue
-from q_learning_world import World, faulty_weights
-from seeds import PREVIEW
 
-from rl_core import figures
-from rl_core.claims import details, record, verdicts
+from drawings import look
+from drawings import q_learning as drawings
+from report import provenance
+from report.captions import captioned
+from report.claims import details, record, verdicts
+from report.figure_data import offer, tidy
+from report.seeds import PREVIEW
 from rl_core.experiments import run
+from studies import q_learning as study
+from studies.q_learning_world import World, faulty_weights
 
-figures.use_style()
+look.use_style()
 RESULTS = Path("../results")
 RESULTS.mkdir(exist_ok=True)
 
@@ -137,7 +138,7 @@ glue("distance_2018", study.distance_from_original(norms, original), display=Fal
 # $q_*$ itself, in the first episode, in the last, and after a million more:
 
 # %% tags=["hide-input"]
-figures.captioned(
+captioned(
     world.unreachable(),
     "Table 2.1. The 12 states that cannot be reached, and the sum of squares of Q* over their "
     "entries. The root of the total is the plateau.",
@@ -173,7 +174,7 @@ drawings.error_split(after[1:], {name: part[:, 1:] for name, part in parts.items
 # %% tags=["hide-input"]
 split = study.final_split(parts)
 glue("unlearned", float(split["share (%)"].iloc[0]), display=False)
-figures.captioned(
+captioned(
     split,
     f"Table 2.2. The squared error after 5,000 episodes: median of {len(study.SEEDS)} seeds with its "
     "95% interval.",
@@ -186,7 +187,7 @@ figures.captioned(
 # **The noise can be predicted too.** Near $q_*$, an update moves an entry by $\alpha$ times its own surprise, whose
 # spread the model tells, plus whatever error it picks up from the entry it looks at; and it shrinks the error that is there by
 # the same share. Gain and loss balance at some level of noise, which comes out of one system of linear equations (`World.noise` in
-# `book/q_learning_world.py`). For figure 9 it is {glue:text}`noise:.3f`. Squares add: the root of
+# `book/studies/q_learning_world.py`). For figure 9 it is {glue:text}`noise:.3f`. Squares add: the root of
 # {glue:text}`plateau:.3f`² + {glue:text}`noise:.3f`² is {glue:text}`level:.3f`. Measured: {glue:text}`late:.3f`.
 # Above the plateau that is {glue:text}`excess:.4f`, of which {glue:text}`excess_predicted:.4f` were predicted; the theory leaves
 # {glue:text}`unexplained:.4f` unexplained.
@@ -228,7 +229,7 @@ glue("constant_above", float(final[study.FIGURE_9.name] - world.plateau), displa
 
 # %% tags=["hide-input"]
 at = np.searchsorted(after, study.FILM_EPISODES)
-figures.Film(
+look.Film(
     drawings.learning_frames(
         world, after[at], arrays["Q_snapshots"][0, at], arrays["visits_snapshots"][0, at]
     ),
@@ -407,7 +408,7 @@ drawings.sweep(
 # the sum of the exponentials belongs. The "probabilities" that come out do not add up to 1:
 
 # %% tags=["hide-input"]
-figures.captioned(
+captioned(
     faulty_weights(world),
     "Table 2.3. The faulty formula exp(Q) / sum(Q), and the softmax of temperature 1.",
     formats=dict.fromkeys(["up", "down", "left", "right", "sum"], "{:.3f}"),
@@ -496,7 +497,7 @@ glue("unvisited_rising", float(100 * typical.loc[study.RISES, "unvisited"]), dis
 #
 # ## Verdicts
 #
-# The criteria stand in code (`book/q_learning_study.py`). Unlike chapter 1's, which were committed before anything was
+# The criteria stand in code (`book/studies/q_learning.py`). Unlike chapter 1's, which were committed before anything was
 # measured, they first appear in the project's history together with the finished chapter: that they came
 # before the data cannot be shown. Estimates are medians over seeds (of each seed's own ratio where arms are compared), intervals 95% bootstrap intervals.
 
@@ -507,10 +508,10 @@ record(findings, RESULTS, chapter="2")
 partly = [finding.claim.id for finding in findings if finding.verdict == "holds in part"]
 assert PREVIEW or partly == ["2b", "2d", "2g", "2i"]  # explained below
 verdicts = verdicts(findings)
-figures.captioned(verdicts, "Table 2.4. The report's claims about Q-learning.")
+captioned(verdicts, "Table 2.4. The report's claims about Q-learning.")
 
 # %% tags=["hide-input"]
-figures.captioned(
+captioned(
     details(findings),
     f"Table 2.5. Each criterion with its evidence: the median of {len(study.SEEDS)} seeds and its 95% interval. "
     "Evenness is the exponential of the visits' entropy, as a share of the entries.",

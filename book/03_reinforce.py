@@ -27,18 +27,19 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import provenance
-import reinforce_figures as drawings
-import reinforce_study as study
-from figure_data import offer
 from myst_nb import glue
-from seeds import premise
 
-from rl_core import figures
-from rl_core.claims import details, record, verdicts, what_it_would_take
+from drawings import look
+from drawings import reinforce as drawings
+from report import provenance
+from report.captions import captioned
+from report.claims import details, record, verdicts, what_it_would_take
+from report.figure_data import offer
+from report.seeds import premise
 from rl_core.rollouts import rollout, weights_of
+from studies import reinforce as study
 
-figures.use_style()
+look.use_style()
 RESULTS = Path("../results")
 ORIGINAL = Path("data/original")
 
@@ -187,7 +188,7 @@ drawings.variants(curves, "MountainCar", names)
 # %% tags=["hide-input"]
 milestones = study.milestones(results.table, curves)
 milestones.to_csv(RESULTS / "reinforce_milestones.csv", index=False)
-figures.captioned(
+captioned(
     milestones,
     "Table 3.1. Steps an episode at the report's milestones (each seed's median over the last 100 "
     f"episodes; median over {len(study.SEEDS)} seeds [95% interval]; ∞: more than half of the seeds had stopped). "
@@ -252,7 +253,7 @@ film(
 # ## How long it took
 
 # %% tags=["hide-input"]
-figures.captioned(
+captioned(
     study.wall_clock(results, {"Acrobot": 2, "MountainCar": 3}),
     "Table 3.2. Time for one run, in the report (minutes, its machine unknown) and now, on one core.",
     formats={"2018 (s)": "{:.0f}", "now (s, mean)": "{:.1f}", "now, all seeds (s)": "{:.0f}"},
@@ -261,17 +262,17 @@ figures.captioned(
 # %% [markdown]
 # ## Verdicts
 #
-# The criteria stand in `book/reinforce_study.py` and were fixed before the runs with the seeds reported here. Three things were changed when the data were
+# The criteria stand in `book/studies/reinforce.py` and were fixed before the runs with the seeds reported here. Three things were changed when the data were
 # known: "above" now excludes its bound; a claim of which no part is met and one is missed now does not hold, where before it was "cannot tell"; and the
 # first ratio of 3d is over all seeds, where it had left out those that used up their budget. "About" means within a quarter. Intervals are 95% bootstrap intervals over seeds.
 
 # %%
 findings = study.findings(curves)
 record(findings, RESULTS, chapter="3")
-figures.captioned(verdicts(findings), "Table 3.3. The report's claims about REINFORCE.")
+captioned(verdicts(findings), "Table 3.3. The report's claims about REINFORCE.")
 
 # %% tags=["hide-input"]
-figures.captioned(
+captioned(
     details(findings),
     "Table 3.4. Each criterion with its evidence.",
 )

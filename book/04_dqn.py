@@ -25,21 +25,22 @@
 # %% tags=["hide-input"]
 from pathlib import Path
 
-import dqn_figures as drawings
-import dqn_study as study
 import numpy as np
 import pandas as pd
-import provenance
 from myst_nb import glue
-from reinforce_figures import before_and_after
-from seeds import premise
 
-from rl_core import figures
-from rl_core.claims import details, record, verdicts, what_it_would_take
+from drawings import dqn as drawings
+from drawings import look
+from drawings.reinforce import before_and_after
+from report import provenance
+from report.captions import captioned
+from report.claims import details, record, verdicts, what_it_would_take
+from report.seeds import premise
 from rl_core.q_networks import q_rollout
 from rl_core.rollouts import weights_of
+from studies import dqn as study
 
-figures.use_style()
+look.use_style()
 RESULTS = Path("../results")
 ORIGINAL = Path("data/original")
 DATA = RESULTS / "figures"
@@ -130,7 +131,7 @@ for number, name, file in ((12, "Acrobot", "acrobot"), (13, "MountainCar", "moun
 # %% tags=["hide-input"]
 milestones = study.milestones(curves)
 milestones.to_csv(RESULTS / "dqn_milestones.csv", index=False)
-figures.captioned(
+captioned(
     milestones,
     "Table 4.1. Steps an episode at the report's milestone and later (each seed's median over the last 10 "
     f"episodes; median over {len(study.SEEDS)} seeds [95% interval]).",
@@ -174,7 +175,7 @@ for name in study.ENV:
 # {glue:text}`ties MountainCar` on MountainCar. A tie counts as a half and pulls the probability towards one half.
 
 # %% tags=["hide-input"]
-figures.captioned(
+captioned(
     study.to_the_budget(curves, list(tricks)),
     "Table 4.2. Steps a goal in the last quarter of the budget (median over seeds [95% interval]; ∞: no goal), and "
     "how many seeds learn (at most 500 steps a goal; 95% interval of the share).",
@@ -217,7 +218,7 @@ drawings.shares(curves, variants)
 # :::
 
 # %% tags=["hide-input"]
-figures.captioned(
+captioned(
     study.to_the_budget(curves, variants),
     "Table 4.3. What each change does to the failure, as Table 4.2.",
 )
@@ -324,7 +325,7 @@ film(
 # ## How long it took
 
 # %% tags=["hide-input"]
-figures.captioned(
+captioned(
     study.wall_clock(results),
     "Table 4.4. Time for one run, in the report (its machine unknown) and now, on one core.",
     formats={"2018 (s)": "{:.0f}", "now (s, mean)": "{:.1f}", "now, all (s)": "{:.0f}"},
@@ -335,17 +336,17 @@ figures.captioned(
 #
 # ## Verdicts
 #
-# The criteria stand in `book/dqn_study.py` and were fixed before the runs with the seeds shown. Two rules were changed after the data were known; no text of a criterion was. A criterion of "above" now excludes
+# The criteria stand in `book/studies/dqn.py` and were fixed before the runs with the seeds shown. Two rules were changed after the data were known; no text of a criterion was. A criterion of "above" now excludes
 # its bound, and a claim of which no part is met and one is missed now does not hold, where before it was "cannot tell". "About"
 # means within a quarter. Intervals are 95% intervals over seeds.
 
 # %%
 findings = study.findings(curves)
 record(findings, RESULTS, chapter="4")
-figures.captioned(verdicts(findings), "Table 4.5. The report's claims about DQN.")
+captioned(verdicts(findings), "Table 4.5. The report's claims about DQN.")
 
 # %% tags=["hide-input"]
-figures.captioned(details(findings), "Table 4.6. Each criterion with its evidence.")
+captioned(details(findings), "Table 4.6. Each criterion with its evidence.")
 
 # %% tags=["remove-cell"]
 glue("open", what_it_would_take(findings), display=False)

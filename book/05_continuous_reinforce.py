@@ -25,21 +25,22 @@
 # %% tags=["hide-input"]
 from pathlib import Path
 
-import continuous_fates as what_became
-import continuous_figures as drawings
-import continuous_study as study
 import numpy as np
 import pandas as pd
-import provenance
 from myst_nb import glue
-from reinforce_figures import before_and_after
-from seeds import SEEDS, premise
 
-from rl_core import figures
-from rl_core.claims import details, record, verdicts, what_it_would_take
+from drawings import continuous as drawings
+from drawings import look
+from drawings.reinforce import before_and_after
+from report import provenance
+from report.captions import captioned
+from report.claims import details, record, verdicts, what_it_would_take
+from report.seeds import SEEDS, premise
 from rl_core.rollouts import rollout, weights_of
+from studies import continuous as study
+from studies import continuous_fates as what_became
 
-figures.use_style()
+look.use_style()
 RESULTS = Path("../results")
 ORIGINAL = Path("data/original")
 (RESULTS / "figures").mkdir(parents=True, exist_ok=True)
@@ -132,7 +133,7 @@ glue("seeds", len(SEEDS), display=False)
 # %% tags=["hide-input"]
 milestones = study.milestones(curves)
 milestones.to_csv(RESULTS / "continuous_milestones.csv", index=False)
-figures.captioned(
+captioned(
     milestones,
     f"Table 5.1. Steps an episode at milestones (each seed's median over its last 100 episodes; "
     f"median over {len(SEEDS)} seeds [95% interval]; ∞: more than half of the seeds had stopped), and what was stopped.",
@@ -263,7 +264,7 @@ drawings.tradeoff(tradeoff)
 # :::
 
 # %% tags=["hide-input"]
-figures.captioned(
+captioned(
     study.tradeoff_text(tradeoff),
     "Table 5.2. The numbers of Figure S5.3: estimate [95% interval].",
 )
@@ -372,7 +373,7 @@ before_and_after(
 # ## How long it took
 
 # %% tags=["hide-input"]
-figures.captioned(
+captioned(
     study.wall_clock(results),
     "Table 5.3. Time for one run, in the report (its machine unknown) and now, on one core.",
     formats={"2018 (s)": "{:.0f}", "now (s, mean)": "{:.1f}", "now, all seeds (s)": "{:.0f}"},
@@ -381,7 +382,7 @@ figures.captioned(
 # %% [markdown]
 # ## Verdicts
 #
-# The criteria stand in `book/continuous_study.py` and were fixed before the runs with seeds 0 to 29. Three rules were changed after the data were known; no text of a criterion was. A criterion of "above"
+# The criteria stand in `book/studies/continuous.py` and were fixed before the runs with seeds 0 to 29. Three rules were changed after the data were known; no text of a criterion was. A criterion of "above"
 # now excludes its bound. A claim of which no part is met and one is missed now does not hold, where before it was "cannot tell". And seeds that the budget ended while they still got out are now judged
 # by what they finished, where they counted as not having learned: this makes more seeds learn: {glue:text}`moved`. It moved no verdict. "About"
 # means within a quarter. σ = 0.5 is what 0.3 and 1 are held against. "Converged" is 300 steps, half as much again as the report's 200; "extremely long" is more than 100,000 steps. Intervals are 95% bootstrap intervals over seeds.
@@ -389,10 +390,10 @@ figures.captioned(
 # %%
 findings = study.findings(curves)
 record(findings, RESULTS, chapter="5")
-figures.captioned(verdicts(findings), "Table 5.4. The report's claims about continuous REINFORCE.")
+captioned(verdicts(findings), "Table 5.4. The report's claims about continuous REINFORCE.")
 
 # %% tags=["hide-input"]
-figures.captioned(details(findings), "Table 5.5. Each criterion with its evidence.")
+captioned(details(findings), "Table 5.5. Each criterion with its evidence.")
 
 # %% tags=["remove-cell"]
 glue("open", what_it_would_take(findings), display=False)

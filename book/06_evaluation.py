@@ -27,18 +27,19 @@
 # %% tags=["hide-input"]
 from pathlib import Path
 
-import evaluation_figures as drawings
-import evaluation_study as study
 import numpy as np
 import pandas as pd
-import provenance
 from myst_nb import glue
-from seeds import premise
 
-from rl_core import figures
-from rl_core.claims import details, record, verdicts
+from drawings import evaluation as drawings
+from drawings import look
+from report import provenance
+from report.captions import captioned
+from report.claims import details, record, verdicts
+from report.seeds import premise
+from studies import evaluation as study
 
-figures.use_style()
+look.use_style()
 RESULTS = Path("../results")
 DATA = RESULTS / "figures"
 DATA.mkdir(parents=True, exist_ok=True)
@@ -90,7 +91,7 @@ premise("under its limit MountainCar is not learned", under["limited_terminated"
 # ## Every agent on every environment
 
 # %% tags=["hide-input"]
-figures.captioned(
+captioned(
     study.summary(policies, "Acrobot"),
     "Table 6.1. Acrobot. Steps and returns: median over seeds [95% interval] of the mean over 100 "
     "episodes. Reached: share of episodes that get to the goal, within 5,000 steps and within the limit.",
@@ -98,14 +99,14 @@ figures.captioned(
 )
 
 # %% tags=["hide-input"]
-figures.captioned(
+captioned(
     study.summary(policies, "MountainCar"),
     "Table 6.2. MountainCar, as Table 6.1.",
     formats={"reached (%)": "{:.0f}", "reached in time (%)": "{:.0f}"},
 )
 
 # %% tags=["hide-input"]
-figures.captioned(
+captioned(
     study.summary(policies, "MountainCarContinuous"),
     "Table 6.3. MountainCarContinuous, as Table 6.1. The tables choose among three forces: −1, 0 and 1.",
     formats={"reached (%)": "{:.0f}", "reached in time (%)": "{:.0f}"},
@@ -147,7 +148,7 @@ drawings.all_agents(policies, published)
 # ### Beside published results
 
 # %% tags=["hide-input"]
-figures.captioned(
+captioned(
     published.drop(columns="address").assign(
         environment=published["environment"].str[:-3],
         **{
@@ -200,7 +201,7 @@ premise(
 for which, row in (("hard", by_hand.iloc[0]), ("soft", soft), ("lost", lost)):
     for column in ("force", "steps", "return"):
         glue(f"{which}-{column}", float(row[column]), display=False)
-figures.captioned(
+captioned(
     agreements,
     "Table 6.5. Do fewest steps and highest return rank the policies the same? Interval: 95%, over "
     "seeds. Pairs apart: those that the two order differently. Shaped: the rewards that chapter 4's "
@@ -256,7 +257,7 @@ for name, grids in optima.items():
     glue(f"gap-{name}", gap, display=False)
 refinement = study.refinement(optima)
 refinement.to_csv(DATA / "table_6_6.csv", index=False)
-figures.captioned(
+captioned(
     refinement,
     "Table 6.6. The fastest way up, mean over 401 starts between −0.6 and −0.4, planned on finer and "
     "finer grids. Fewest, most: over the starts, as driven.",
@@ -298,7 +299,7 @@ drawings.bins(costs, policies, fewest, network)
 #
 
 # %% tags=["hide-input"]
-figures.captioned(
+captioned(
     study.by_bins(costs, fewest),
     "Table 6.7. The greedy table against the number of bins: steps to the goal, median over seeds "
     "[95% interval]; how far the median is above the fastest way; seeds that need more than 500 "
@@ -327,7 +328,7 @@ figures.captioned(
 # ## How long it took
 
 # %% tags=["hide-input"]
-figures.captioned(
+captioned(
     study.times(results),
     "Table 6.8. Seconds for one run, in the report (its machine unknown) and now: a seed's share of a "
     "block on one core, median over seeds.",
@@ -347,17 +348,17 @@ figures.captioned(
 #
 # ## Verdicts
 #
-# The criteria stand in `book/evaluation_study.py` and were fixed before the runs with seeds 0 to 29. With the data known, one thing was
+# The criteria stand in `book/studies/evaluation.py` and were fixed before the runs with seeds 0 to 29. With the data known, one thing was
 # corrected: the intervals of the first three parts of 3n also draw the networks' seeds, where they had taken the networks' median as known. Intervals are 95%
 # bootstrap intervals over seeds.
 
 # %%
 findings = study.findings(results, policies)
 record(findings, RESULTS, chapter="6")
-figures.captioned(verdicts(findings), "Table 6.9. The report's claims about evaluation.")
+captioned(verdicts(findings), "Table 6.9. The report's claims about evaluation.")
 
 # %% tags=["hide-input"]
-figures.captioned(details(findings), "Table 6.10. Each criterion with its evidence.")
+captioned(details(findings), "Table 6.10. Each criterion with its evidence.")
 
 # %% [markdown]
 # **What to take along.** Steps and returns are two names for one thing only while every step costs the same. Say under which time limit an

@@ -41,17 +41,17 @@
 # %% tags=["hide-input"]
 from pathlib import Path
 
-import provenance
 from myst_nb import glue
-from seeds import SEEDS
 
-from rl_core import figures
+from report import provenance
+from report.captions import captioned
+from report.seeds import SEEDS
 
 glue("seeds", len(SEEDS), display=False)
 glue("last-seed", SEEDS[-1], display=False)
 RESULTS = Path("../results")
 made = provenance.read(RESULTS)
-figures.captioned(
+captioned(
     provenance.versions(made), "Table A.1. What the results were made with, as stored beside them."
 )
 
@@ -66,7 +66,7 @@ figures.captioned(
 
 # %% tags=["hide-input"]
 provenance.by_arm(made).to_csv(RESULTS / "provenance.csv", index=False)
-figures.captioned(
+captioned(
     provenance.by_arm(made).drop(columns=["config", "algorithm"]),
     "Table A.2. The arms of all chapters. Seconds of one core, all seeds together; the beginning of the digest of the first seed.",
     formats={"seconds": "{:.1f}"},

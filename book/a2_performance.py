@@ -27,12 +27,13 @@
 from pathlib import Path
 
 import pandas as pd
-import performance_study as study
 from myst_nb import glue
 
-from rl_core import figures
+from drawings import look
+from report.captions import captioned
+from studies import performance as study
 
-figures.use_style()
+look.use_style()
 FIGURES = Path("../results/figures")
 FIGURES.mkdir(parents=True, exist_ok=True)
 bench = pd.read_csv("data/bench.csv")
@@ -57,14 +58,14 @@ study.bench_figure(bench)
 # :::
 
 # %% tags=["hide-input"]
-figures.captioned(
+captioned(
     bench.drop(columns=["machine", "date", "note"]),
     "Table B.1. The same in numbers, and the memory.",
     formats=dict.fromkeys(["rival", "ours", "ratio"], "{:.4g}"),
 )
 
 # %% tags=["hide-input"]
-figures.captioned(bench[["benchmark", "against", "note"]], "Table B.2. How each was measured.")
+captioned(bench[["benchmark", "against", "note"]], "Table B.2. How each was measured.")
 
 # %% [markdown]
 # ## How the cost grows

@@ -28,18 +28,19 @@
 # %% tags=["remove-input"]
 from pathlib import Path
 
-import front_page
 import pandas as pd
-import provenance
 from IPython.display import HTML, display
 from myst_nb import glue
-from seeds import SEEDS
 
-from rl_core import figures, maze_figures
+from drawings import look
+from drawings import maze as maze_drawings
+from report import front_page, provenance
+from report.captions import captioned
+from report.seeds import SEEDS
 from rl_core.maze import Maze
 from rl_core.planning import value_iteration
 
-figures.use_style()
+look.use_style()
 RESULTS = Path("../results")
 claims = front_page.claims(RESULTS, pd.read_csv("data/claims.csv", dtype=str))
 for verdict, count in front_page.counts(claims).items():
@@ -66,7 +67,7 @@ HTML(front_page.claims_table(claims))
 
 # %% tags=["remove-input"]
 maze = Maze()
-situation = maze_figures.situation_figure(
+situation = maze_drawings.situation_figure(
     maze, value_iteration(maze.model(), gamma=0.9).Q, maze.flag_sets[0]
 )
 display(HTML(front_page.thumbnails(RESULTS, Path("data/original"), situation)))
@@ -86,7 +87,7 @@ display(HTML(front_page.thumbnails(RESULTS, Path("data/original"), situation)))
 # %% tags=["remove-input"]
 made = provenance.read(RESULTS)
 processors = " and ".join(sorted(made["processor"].unique()))
-figures.captioned(
+captioned(
     provenance.by_chapter(made),
     f"Table 0.1. Experiments of the chapters and the time their training took on one core ({processors}). "
     "A run is one seed of one arm. Not counted: planning, evaluation, statistics and drawing.",

@@ -14,8 +14,9 @@ from urllib.parse import urldefrag
 
 import pandas as pd
 import pytest
-from chromium import NoBrowserError, open_browser
 from playwright.sync_api import Browser, Page, Route
+
+from web.chromium import NoBrowserError, open_browser
 
 ROOT = Path(__file__).parent.parent
 SITE = ROOT / "_build" / "html"

@@ -5,7 +5,7 @@ import math
 import pandas as pd
 import pytest
 
-from rl_core.claims import (
+from report.claims import (
     COLUMNS,
     Claim,
     Criterion,

@@ -1,15 +1,15 @@
 """Chapter 5's measures on made-up runs whose answers are known."""
 
-import continuous_fates as what_became
-import continuous_figures as drawings
-import continuous_study as study
 import numpy as np
 import pandas as pd
 import pytest
 
+from drawings import continuous as drawings
 from rl_core.policies import Gaussian
 from rl_core.reinforce import ReinforceConfig
 from rl_core.rollouts import mean_actions
+from studies import continuous as study
+from studies import continuous_fates as what_became
 
 EPISODES = 600
 SIGMA = 0.3

@@ -1,9 +1,10 @@
 """Chapter 4's own measures, by hand."""
 
-import dqn_study as study
 import numpy as np
 import pandas as pd
 import pytest
+
+from studies import dqn as study
 
 
 def episodes(steps, terminated):

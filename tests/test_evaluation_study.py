@@ -2,13 +2,13 @@
 
 from types import SimpleNamespace
 
-import evaluation_study as study
 import numpy as np
 import pandas as pd
 import pytest
 
 from rl_core import shaping
 from rl_core.evaluation import evaluate, uniform
+from studies import evaluation as study
 
 
 def _policies(name, steps, returns):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rl_core import dynamics
-from rl_core.fastest import fastest
+from studies.fastest import fastest
 
 STARTS = np.linspace(-0.6, -0.4, 21)
 

@@ -1,9 +1,10 @@
 """The figures' data: what is written is what was drawn."""
 
-import figure_data
 import numpy as np
 import pandas as pd
 import pytest
+
+from report import figure_data
 
 
 def test_every_point_of_every_curve_is_a_row():

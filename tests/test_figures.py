@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rl_core.figures import Film, captioned
+from drawings.look import Film
+from report.captions import captioned
 
 
 def decode(film, path, shape):

@@ -3,10 +3,11 @@
 import re
 from pathlib import Path
 
-import front_page
 import numpy as np
 import pandas as pd
 import pytest
+
+from report import front_page
 
 EXPECTED = pd.DataFrame({"id": ["1a", "2b", "3c"]})
 FOUND = pd.DataFrame(
@@ -96,6 +97,6 @@ def test_a_thumbnail_shows_the_first_arm_of_a_figure_with_several(tmp_path):
 
 
 def test_every_chapter_has_its_page():
-    book = Path(front_page.__file__).parent
+    book = Path(front_page.__file__).parent.parent
     notebooks = {path.stem for path in book.glob("[0-9]*.ipynb")}
     assert notebooks == set(front_page.PAGES.values())

@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from drawings.maze import Move, episode_frames, follow_policy, situation_figure
 from rl_core.maze import Maze
-from rl_core.maze_figures import Move, episode_frames, follow_policy, situation_figure
 from rl_core.planning import value_iteration
 
 

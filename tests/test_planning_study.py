@@ -2,12 +2,12 @@
 
 import numpy as np
 import pandas as pd
-import planning_study as study
 import pytest
 
+from drawings.maze import follow_policy
 from rl_core.maze import Maze
-from rl_core.maze_figures import follow_policy
 from rl_core.planning import policy_iteration, q_value_iteration, value_iteration
+from studies import planning as study
 
 
 @pytest.fixture(scope="module")

@@ -65,9 +65,10 @@ def test_the_reading_of_prose():
 def settings(path):
     """Every number in the code of a chapter and its study, and the defaults of its algorithms."""
     code = [cell.source for cell in jupytext.read(path).cells if cell.cell_type == "code"]
-    own = [BOOK / f"{name}.py" for name in imported("\n".join(code)) if name.endswith("_study")]
+    names = re.findall(r"^from studies import (\w+) as study$", "\n".join(code), re.MULTILINE)
+    own = [BOOK / "studies" / f"{name}.py" for name in names]
     code += [file.read_text() for file in own]
-    core = [ROOT / "rl_core" / f"{name}.py" for name in imported("\n".join(code), "rl_core.")]
+    core = [ROOT / "rl_core" / f"{name}.py" for name in imported("\n".join(code))]
     assert path in OTHERS or (own and core)
     trees = [ast.parse(source) for source in code]
     for file in core:
@@ -77,9 +78,9 @@ def settings(path):
     return {float(node.value) for node in nodes if type(node.value) in (int, float)}
 
 
-def imported(code, package=""):
-    """The names of the modules that code imports from a package, or at the top level."""
-    return re.findall(rf"^(?:import|from) {re.escape(package)}(\w+)(?! *\.)", code, re.MULTILINE)
+def imported(code):
+    """The names of the modules of `rl_core` that code imports from."""
+    return re.findall(r"^(?:import|from) rl_core\.(\w+)(?! *\.)", code, re.MULTILINE)
 
 
 def reported():

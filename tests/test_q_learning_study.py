@@ -3,11 +3,11 @@
 import numpy as np
 import pandas as pd
 import pytest
-import q_learning_study as study
-from q_learning_world import GAMMA, World, faulty_weights
 
 from rl_core.exploration import EpsilonGreedy
 from rl_core.q_learning import QLearningConfig, q_learning
+from studies import q_learning as study
+from studies.q_learning_world import GAMMA, World, faulty_weights
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,10 @@ import pkgutil
 import re
 from pathlib import Path
 
-import docstrings
 import pytest
 
 import rl_core
+from web import docstrings
 
 PAGE = (Path(__file__).parent.parent / "book" / "api.md").read_text()
 LISTED = re.findall(r"^\.\. automodule:: (\S+)$", PAGE, re.MULTILINE)

@@ -3,7 +3,8 @@
 import numpy as np
 import pandas as pd
 import pytest
-import reinforce_study as study
+
+from studies import reinforce as study
 
 
 def table(steps):

@@ -7,10 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from seeds import FULL, SEEDS, chosen, premise
+
+from report.seeds import FULL, SEEDS, chosen, premise
 
 ROOT = Path(__file__).parent.parent
-STUDIES = sorted(path.stem for path in (ROOT / "book").glob("*_study.py"))
+STUDIES = sorted(path.stem for path in (ROOT / "book/studies").glob("[a-z]*.py"))
 
 
 @pytest.mark.parametrize("count", [2, 3, FULL])
@@ -37,22 +38,22 @@ def module_in_a_new_process(code, **setting):
     [({}, "30 False"), ({"SEEDS": ""}, "30 False"), ({"SEEDS": "4"}, "4 True")],
 )
 def test_a_preview_is_what_has_fewer_seeds_than_the_book(setting, expected):
-    code = "import seeds; print(len(seeds.SEEDS), seeds.PREVIEW)"
+    code = "from report import seeds; print(len(seeds.SEEDS), seeds.PREVIEW)"
     assert module_in_a_new_process(code, **setting).stdout.strip() == expected
 
 
 def test_a_bad_setting_stops_the_import():
-    done = module_in_a_new_process("import seeds", SEEDS="many")
+    done = module_in_a_new_process("import report.seeds", SEEDS="many")
     assert done.returncode != 0
     assert "SEEDS must be a whole number from 2 to 30, got 'many'" in done.stderr
 
 
 def test_every_study_uses_the_setting():
-    """But for the measurements of speed, which stand on no seeds."""
-    modules = {study: vars(importlib.import_module(study)) for study in STUDIES}
+    """But for the measurements of speed, and the models, which stand on no seeds."""
+    modules = {name: vars(importlib.import_module(f"studies.{name}")) for name in STUDIES}
     without = {study for study, names in modules.items() if names.get("SEEDS") is not SEEDS}
-    assert without == {"performance_study"}
-    assert "SEEDS" not in modules["performance_study"]
+    assert without == {"fastest", "performance", "q_learning_world"}
+    assert not any("SEEDS" in modules[name] for name in without)
 
 
 def test_a_sentence_stands_on_its_premise():

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pandas as pd
-from evaluation_study import CAP, ENV, KEY, LEARNED, LIMIT, steps_of
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rl_core.figures import BLACK, BLUE, COLOURS, GREEN, GREY, VERMILLION, label
+from drawings.look import BLACK, BLUE, COLOURS, GREEN, GREY, VERMILLION, label
 from rl_core.statistics import bootstrap_interval
+from studies.evaluation import CAP, ENV, KEY, LEARNED, LIMIT, steps_of
 
 MARKS = {"random": "x", "REINFORCE": "o", "DQN": "s", "table": "^"}
 INKS = dict(zip(MARKS, (BLACK, BLUE, VERMILLION, GREEN), strict=True))

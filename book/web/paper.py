@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from chromium import NoBrowserError, open_browser
+from web.chromium import NoBrowserError, open_browser
 
 STYLE = """
     .sidebar-toggle, .header-article, .bd-header-article, .bd-sidebar-secondary, .prev-next-footer,
@@ -61,7 +61,7 @@ def print_page(page: Path, pdf: Path) -> None:
 
     Raises
     ------
-    chromium.NoBrowserError
+    web.chromium.NoBrowserError
         If no browser is installed.
     """
     with open_browser() as browser, browser.new_context(color_scheme="light") as context:

@@ -13,13 +13,13 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import FixedFormatter, FixedLocator, NullLocator
-from q_learning_study import EPISODES
-from q_learning_world import World
 
-from rl_core.figures import BLACK, BLUE, GREEN, GREY, ORANGE, SKY_BLUE, VERMILLION, label
+from drawings.look import BLACK, BLUE, GREEN, GREY, ORANGE, SKY_BLUE, VERMILLION, label
+from drawings.maze import VALUES, WALL
 from rl_core.maze import MOVES
-from rl_core.maze_figures import VALUES, WALL
 from rl_core.statistics import bootstrap_interval
+from studies.q_learning import EPISODES
+from studies.q_learning_world import World
 
 WIDTH = 5.6  # inches: small, so that the letters stay large on a phone
 

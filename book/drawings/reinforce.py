@@ -9,11 +9,11 @@ from matplotlib import font_manager
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 from PIL import Image, ImageDraw, ImageFont
-from reinforce_study import DRAWN, Curves
 
-from rl_core.figures import BLACK, BLUE, COLOURS, GREY, LINES, Film, label
+from drawings.look import BLACK, BLUE, COLOURS, GREY, LINES, Film, label
 from rl_core.rollouts import Rollout
 from rl_core.statistics import bootstrap_interval
+from studies.reinforce import DRAWN, Curves
 
 LIMIT = {"Acrobot": 500, "MountainCar": 200}  # Gymnasium's own time limits, for orientation
 

@@ -9,26 +9,26 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import continuous_study
-import dqn_study
 import numpy as np
 import pandas as pd
-import reinforce_study
 from joblib import Parallel, delayed
 from scipy.stats import kendalltau
-from seeds import SEEDS
 
+from report.claims import Claim, Criterion, Evidence, Finding
+from report.seeds import SEEDS
 from rl_core.arm import Arm
-from rl_core.claims import Claim, Criterion, Evidence, Finding
 from rl_core.discretise import binned
 from rl_core.evaluation import Agent, as_learned, evaluate, evaluate_table, greedy, of_values
 from rl_core.experiments import Results, run
 from rl_core.exploration import EpsilonGreedy, Evaluation, Linear
-from rl_core.fastest import Fastest, fastest
 from rl_core.grid_learning import GridConfig, q_learning_on_grid
 from rl_core.q_learning import QLearningConfig
 from rl_core.rollouts import weights_of
 from rl_core.statistics import bootstrap_interval, proportion_interval
+from studies import continuous as continuous_study
+from studies import dqn as dqn_study
+from studies import reinforce as reinforce_study
+from studies.fastest import Fastest, fastest
 
 ENV = {
     "Acrobot": "Acrobot-v1",

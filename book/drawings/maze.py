@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Rectangle
 from numpy.typing import NDArray
 
-from rl_core.figures import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILLION
+from drawings.look import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILLION
 from rl_core.maze import CLOCKWISE, MOVES, Maze
 from rl_core.planning import optimal_actions
 

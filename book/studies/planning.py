@@ -11,11 +11,11 @@ from itertools import islice, pairwise
 
 import numpy as np
 import pandas as pd
-from seeds import SEEDS
 
-from rl_core.claims import Claim, Criterion, Evidence, Finding
+from drawings.maze import Move
+from report.claims import Claim, Criterion, Evidence, Finding
+from report.seeds import SEEDS
 from rl_core.maze import ACTIONS, Maze, random_maze
-from rl_core.maze_figures import Move
 from rl_core.mdp import MDP
 from rl_core.planning import (
     backup,

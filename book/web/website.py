@@ -3,9 +3,10 @@
 from typing import Any
 
 import sphinx_thebe
-from seeds import FULL, PREVIEW, SEEDS
 from sphinx.application import Sphinx
 from sphinx.config import Config
+
+from report.seeds import FULL, PREVIEW, SEEDS
 
 BANNER = (
     f"<strong>Preview with {len(SEEDS)} seeds.</strong> Numbers, intervals and verdicts are not "

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from seeds import SEEDS
+
+from report.seeds import SEEDS
 
 FOLDER = Path("../results/figures")
 

@@ -11,9 +11,9 @@ import pandas as pd
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
-from seeds import PREVIEW
 
-from rl_core.figures import BLACK, BLUE, GREY, label
+from drawings.look import BLACK, BLUE, GREY, label
+from report.seeds import PREVIEW
 from rl_core.maze import Maze, random_maze
 from rl_core.planning import value_iteration
 from rl_core.reinforce import ReinforceConfig, reinforce

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from seeds import SEEDS
 
+from report.claims import Claim, Criterion, Evidence, Finding
+from report.seeds import SEEDS
 from rl_core.arm import Arm
-from rl_core.claims import Claim, Criterion, Evidence, Finding
 from rl_core.experiments import Results, run
 from rl_core.policies import Gaussian
 from rl_core.reinforce import ReinforceConfig, reinforce

@@ -5,23 +5,11 @@ from collections.abc import Mapping, Sequence
 import gymnasium as gym
 import numpy as np
 import pandas as pd
-from continuous_fates import FATES
-from continuous_study import (
-    CONVERGED,
-    EARLY,
-    ENV,
-    EPISODES,
-    LEARNED,
-    SIGMAS,
-    SWEEPS,
-    Curves,
-)
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from seeds import SEEDS
 
-from rl_core.figures import (
+from drawings.look import (
     BLACK,
     BLUE,
     COLOURS,
@@ -33,9 +21,21 @@ from rl_core.figures import (
     VERMILLION,
     label,
 )
+from report.seeds import SEEDS
 from rl_core.reinforce import ReinforceConfig
 from rl_core.rollouts import Weights, mean_actions, state_grid
 from rl_core.statistics import bootstrap_interval
+from studies.continuous import (
+    CONVERGED,
+    EARLY,
+    ENV,
+    EPISODES,
+    LEARNED,
+    SIGMAS,
+    SWEEPS,
+    Curves,
+)
+from studies.continuous_fates import FATES
 
 EVERY = 10  # episodes between drawn points
 

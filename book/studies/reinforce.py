@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from figure_data import tidy
-from seeds import SEEDS
 
+from report.claims import Claim, Criterion, Evidence, Finding
+from report.figure_data import tidy
+from report.seeds import SEEDS
 from rl_core.arm import Arm
-from rl_core.claims import Claim, Criterion, Evidence, Finding
 from rl_core.experiments import Results, run
 from rl_core.reinforce import ReinforceConfig, reinforce
 from rl_core.statistics import (

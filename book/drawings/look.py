@@ -4,18 +4,15 @@ import base64
 import html
 import subprocess
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
 import imageio_ffmpeg
 import matplotlib as mpl
 import numpy as np
-import pandas as pd
 from cycler import cycler
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
-from pandas.io.formats.style import Styler
-from pandas.io.formats.style_render import CSSDict
 
 # Okabe & Ito (2008), "Color universal design": told apart with every common colour blindness.
 BLACK = "#000000"
@@ -75,47 +72,6 @@ def label(axes: Axes, *, x: str, y: str, title: str = "") -> None:
     axes.set_ylabel(y)
     if title:
         axes.set_title(title)
-
-
-def captioned(
-    table: pd.DataFrame,
-    caption: str,
-    *,
-    formats: Mapping[str, str] | None = None,
-    boldest: Sequence[str] = (),
-) -> Styler:
-    """Show a table with a caption and without its row numbers; words are set to the left.
-
-    Its address on the page is that of its number: `#T_table-3-1` for "Table 3.1. Steps ...".
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        What to show.
-    caption : str
-        The caption, beginning with the table's number and a full stop.
-    formats : mapping of str to str, optional
-        A format for a column's numbers, such as "{:.2f}".
-    boldest : sequence of str
-        Columns among which the largest of each row is set in bold.
-
-    Examples
-    --------
-    >>> numbers = pd.DataFrame({"x": [0.123, 4.5]})
-    >>> page = captioned(numbers, "Table 0. Numbers.", formats={"x": "{:.1f}"}).to_html()
-    >>> "Table 0. Numbers." in page, "4.5" in page, "0.123" in page
-    (True, True, False)
-    """
-    # A fixed id: the same table gives the same page, and links can lead to it.
-    number = caption.partition(". ")[0].rstrip(".")
-    styled = table.style.set_uuid(number.lower().replace(" ", "-").replace(".", "-"))
-    styled = styled.set_caption(caption).hide(axis="index").format(dict(formats or {}))
-    words = [i for i, kind in enumerate(table.dtypes) if not pd.api.types.is_numeric_dtype(kind)]
-    left = [CSSDict(selector=f".col{i}", props="text-align: left") for i in words]
-    styled = styled.set_table_styles(left)
-    if boldest:
-        styled = styled.highlight_max(subset=list(boldest), axis=1, props="font-weight: bold")
-    return styled
 
 
 class Film:

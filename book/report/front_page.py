@@ -14,10 +14,10 @@ import numpy as np
 import pandas as pd
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
-from seeds import SEEDS
 
-from rl_core import claims as judged
-from rl_core.figures import BLUE, GREY
+from drawings.look import BLUE, GREY
+from report import claims as judged
+from report.seeds import SEEDS
 
 VERDICTS = {  # in the order of the page: what failed stands first
     "does not hold": "No criterion is met, and at least one is missed by its whole interval.",

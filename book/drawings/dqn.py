@@ -4,17 +4,17 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
-from dqn_study import BUDGET, ENV, EPISODES, LEARNED, PARTS, Curves
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from rl_core.figures import BLACK, BLUE, COLOURS, GREY, LINES, ORANGE, SKY_BLUE, VERMILLION, label
+from drawings.look import BLACK, BLUE, COLOURS, GREY, LINES, ORANGE, SKY_BLUE, VERMILLION, label
 from rl_core.q_networks import action_values
 from rl_core.rollouts import Rollout, Weights
 from rl_core.statistics import bootstrap_interval
+from studies.dqn import BUDGET, ENV, EPISODES, LEARNED, PARTS, Curves
 
 PUSHES = ("left", "none", "right")
 _PUSH_COLOURS = ListedColormap([SKY_BLUE, "#eeeeee", ORANGE])

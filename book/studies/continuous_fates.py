@@ -5,13 +5,13 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pandas as pd
-from continuous_study import ENV, EXTREME, VARIANTS, Curves
-from seeds import SEEDS
 
+from report.seeds import SEEDS
 from rl_core.experiments import Results
 from rl_core.policies import Gaussian
 from rl_core.reinforce import ReinforceConfig
 from rl_core.rollouts import mean_actions, rollout, weights_of
+from studies.continuous import ENV, EXTREME, VARIANTS, Curves
 
 FATES = (
     "learned",

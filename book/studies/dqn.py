@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from seeds import SEEDS
 
+from report.claims import Claim, Criterion, Evidence, Finding
+from report.seeds import SEEDS
 from rl_core.arm import Arm
-from rl_core.claims import Claim, Criterion, Evidence, Finding
 from rl_core.dqn import DQNConfig, dqn
 from rl_core.epsilon import Decay
 from rl_core.evaluation import evaluate, of_values

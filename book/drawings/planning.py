@@ -4,7 +4,7 @@ import pandas as pd
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
-from rl_core.figures import BLUE, GREEN, GREY, VERMILLION, YELLOW, label
+from drawings.look import BLUE, GREEN, GREY, VERMILLION, YELLOW, label
 
 FLOOR = 1e-9  # errors below are rounding, and drawn here
 

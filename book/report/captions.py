@@ -1,0 +1,48 @@
+"""Tables with their captions."""
+
+from collections.abc import Mapping, Sequence
+
+import pandas as pd
+from pandas.io.formats.style import Styler
+from pandas.io.formats.style_render import CSSDict
+
+
+def captioned(
+    table: pd.DataFrame,
+    caption: str,
+    *,
+    formats: Mapping[str, str] | None = None,
+    boldest: Sequence[str] = (),
+) -> Styler:
+    """Show a table with a caption and without its row numbers; words are set to the left.
+
+    Its address on the page is that of its number: `#T_table-3-1` for "Table 3.1. Steps ...".
+
+    Parameters
+    ----------
+    table : pandas.DataFrame
+        What to show.
+    caption : str
+        The caption, beginning with the table's number and a full stop.
+    formats : mapping of str to str, optional
+        A format for a column's numbers, such as "{:.2f}".
+    boldest : sequence of str
+        Columns among which the largest of each row is set in bold.
+
+    Examples
+    --------
+    >>> numbers = pd.DataFrame({"x": [0.123, 4.5]})
+    >>> page = captioned(numbers, "Table 0. Numbers.", formats={"x": "{:.1f}"}).to_html()
+    >>> "Table 0. Numbers." in page, "4.5" in page, "0.123" in page
+    (True, True, False)
+    """
+    # A fixed id: the same table gives the same page, and links can lead to it.
+    number = caption.partition(". ")[0].rstrip(".")
+    styled = table.style.set_uuid(number.lower().replace(" ", "-").replace(".", "-"))
+    styled = styled.set_caption(caption).hide(axis="index").format(dict(formats or {}))
+    words = [i for i, kind in enumerate(table.dtypes) if not pd.api.types.is_numeric_dtype(kind)]
+    left = [CSSDict(selector=f".col{i}", props="text-align: left") for i in words]
+    styled = styled.set_table_styles(left)
+    if boldest:
+        styled = styled.highlight_max(subset=list(boldest), axis=1, props="font-weight: bold")
+    return styled
