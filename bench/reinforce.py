@@ -38,7 +38,7 @@ CONFIGS = {
     "MountainCar-v0": ReinforceConfig(max_episode_steps=100_000, learn_from_capped=False),
     "MountainCarContinuous-v0": ReinforceConfig(
         policy=Gaussian(mean="weights", sigma=0.5),
-        biases=False,
+        network=MLP(biases=False),
         learning_rate=2e-3,
         epochs=1,
         normalise="centre",
@@ -59,10 +59,10 @@ class UsualAgent:
         self.gaussian = isinstance(config.policy, Gaussian)
         n_in = self.env.observation_space.shape[0]
         n_out = n_in if self.gaussian else self.env.action_space.n
-        widths = (n_in, *config.hidden, n_out)
+        widths = (n_in, *config.network.hidden, n_out)
         layers = []
         for a, b in pairwise(widths):
-            layers += [nn.Linear(a, b, bias=config.biases), nn.ReLU()]
+            layers += [nn.Linear(a, b, bias=config.network.biases), nn.ReLU()]
         self.network = nn.Sequential(*layers[:-1])
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=config.learning_rate)
 

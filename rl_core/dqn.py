@@ -242,14 +242,13 @@ def update(learner: Learner | TorchLearner, memory: Memory) -> bool:
     return learner.update(memory)
 
 
-@overload(q_values)
-def _q_values_compiled(learner: Any, observation: Any) -> Callable[..., Any]:
-    return lambda learner, observation: q_update.q_values(learner, observation)
-
-
-@overload(update)
-def _update_compiled(learner: Any, memory: Any) -> Callable[..., Any]:
-    return lambda learner, memory: q_update.update(learner, memory)
+# What the two mean in compiled code.
+overload(q_values)(
+    lambda learner, observation: (
+        lambda learner, observation: q_update.q_values(learner, observation)
+    )
+)
+overload(update)(lambda learner, memory: lambda learner, memory: q_update.update(learner, memory))
 
 
 @register_jitable

@@ -7,7 +7,6 @@
 Nothing is learned here; REINFORCE and the evaluation of policies play their episodes with it.
 """
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -63,11 +62,14 @@ def act(
     likelihood.draw_action(actor.policy, actor.log_sigma.detach().numpy(), units, noise, action)
 
 
-@overload(act)
-def _act_compiled(actor: Any, observation: Any, noise: Any, action: Any) -> Callable[..., None]:
-    return lambda actor, observation, noise, action: likelihood.choose_action(
-        actor, observation, noise, action
+# What it means in compiled code.
+overload(act)(
+    lambda actor, observation, noise, action: (
+        lambda actor, observation, noise, action: likelihood.choose_action(
+            actor, observation, noise, action
+        )
     )
+)
 
 
 class Trajectory:

@@ -43,6 +43,9 @@ COLUMNS = (
 )
 """The columns of a table of evaluation, besides the measures."""
 
+Weights = Mapping[str, NDArray[np.float32]]
+"""The weights of one seed by name, as `rl_core.training.weights_of` takes them out of a run."""
+
 Measure = Callable[[NDArray[np.float32], NDArray[np.float32], NDArray[np.float64]], float]
 """Observations, actions and rewards of an episode to a number."""
 

@@ -9,14 +9,14 @@ import rl_core
 
 CALLER = """
 from callee import g
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 
 @compiled
 def f(x):
     return g(x) * 10
 """
 CALLEE = """
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 
 @compiled
 def g(x):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from rl_core.discretise import Discretised, action_levels, binned, cell, make_grid
+from rl_core.worlds.discretise import Discretised, action_levels, binned, cell, make_grid
 from rl_core.exploration import EpsilonGreedy, Evaluation
 from rl_core.q_learning import QLearningConfig, q_learning
 

@@ -4,7 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from rl_core.discretise import Discretised, binned
+from rl_core.worlds.discretise import Discretised, binned
 from rl_core.evaluation import (
     Agent,
     as_learned,

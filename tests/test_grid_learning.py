@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rl_core.discretise import binned
+from rl_core.worlds.discretise import binned
 from rl_core.evaluation import evaluate_table
 from rl_core.exploration import EpsilonGreedy
 from rl_core.grid_learning import GridConfig, q_learning_on_grid

@@ -14,7 +14,7 @@ FILES = {
     "learner.py": """
         from lab import networks            # a module by `from package import`
         from .deep.inner import helper      # relative, into a subpackage
-        from rl_core.run import Run         # another followed package
+        from rl_core.training import Run         # another followed package
         import numpy as np                  # not followed
 
         def learn():

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 import rl_core.store as store_module
-from rl_core.run import Failure
+from rl_core.training import Failure
 from rl_core.store import ARRAYS, RECORD, TABLE, DamagedResultError, Store
 
 DIGEST = "0f" * 32

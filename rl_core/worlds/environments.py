@@ -215,10 +215,12 @@ def _step_task(
     return reward, terminated, False
 
 
-@overload(step)
-def _step_compiled(stepper: Any, action: Any, following: Any) -> Callable[..., Any]:
-    """What `step` means in compiled code."""
-    return lambda stepper, action, following: _step_task(stepper, action, following)
+# What it means in compiled code.
+overload(step)(
+    lambda stepper, action, following: (
+        lambda stepper, action, following: _step_task(stepper, action, following)
+    )
+)
 
 
 def open_world(env: EnvironmentLike) -> World:
