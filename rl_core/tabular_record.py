@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rl_core.compiled import compiled
 from rl_core.mdp import MDP
-from rl_core.plan import optimal_actions
+from rl_core.planning import optimal_actions
 
 TOLERANCE = 1e-12
 """How far values may still move in a sweep when a policy counts as evaluated."""
