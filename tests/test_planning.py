@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from rl_core import plan as plan_module
-from rl_core import planning, sweeps
+from rl_core import planning
+from rl_core.kernels import sweeps
 from rl_core.maze import Maze, random_maze
 from rl_core.mdp import MDP
 from rl_core.planning import (
@@ -399,7 +399,7 @@ def test_same_bits_whether_probabilities_are_shared_or_not():
 def test_order_of_the_sweeps():
     # Without slips the search finds V* itself: the estimates are its values, in falling order.
     mdp = random_maze(20, 20, 3, 0.2, np.random.default_rng(6), slip=0).model()
-    transitions, _ = sweeps.arrays(mdp)
+    transitions, _ = planning._opened(mdp, 0.9)[1:]
     order, V = np.empty(mdp.n_states, np.int32), np.empty(mdp.n_states)
     r = backup(mdp, np.zeros(mdp.n_states), gamma=0.9)
     ordered = sweeps.in_order(transitions, r, mdp.terminal, 0.9, order, V)
@@ -470,7 +470,7 @@ def test_progress_is_shown_after_a_while_and_can_be_switched_off(monkeypatch, ca
     mdp = Maze().model()
     q_value_iteration(mdp, gamma=0.9)
     assert capsys.readouterr().err == ""  # too quick to be shown
-    monkeypatch.setattr(plan_module, "PATIENCE", 1e-9)
+    monkeypatch.setattr(planning, "PATIENCE", 1e-9)
     for planner in (q_value_iteration, value_iteration, policy_iteration):
         planner(mdp, gamma=0.9, progress=False)
         assert capsys.readouterr().err == ""
@@ -506,17 +506,21 @@ def test_the_tolerance_an_error_names_can_be_had():
 @pytest.mark.parametrize("planner", [q_value_iteration, value_iteration, policy_iteration])
 @pytest.mark.parametrize("gamma", [1, 1.0, -0.1, 1.5, float("nan"), float("inf")])
 def test_gamma_out_of_range(planner, gamma):
-    with pytest.raises(ValueError, match=r"gamma must lie in \[0, 1\)"):
+    with pytest.raises(ValueError, match="gamma must be a number from 0"):
         planner(Maze().model(), gamma=gamma)
 
 
 @pytest.mark.parametrize(
     ("call", "error", "message"),
     [
-        (lambda m: value_iteration(Maze(), gamma=0.9), TypeError, "mdp must be an MDP .* not Maze"),
-        (lambda m: value_iteration(m, gamma="0.9"), TypeError, "gamma must be a number, not str"),
-        (lambda m: value_iteration(m, gamma=True), TypeError, "gamma must be a number, not bool"),
-        (lambda m: value_iteration(m, gamma=0.9, tolerance=0), ValueError, "tolerance must be pos"),
+        (lambda m: value_iteration(Maze(), gamma=0.9), TypeError, "mdp must be an MDP .*Maze"),
+        (lambda m: value_iteration(m, gamma="0.9"), TypeError, "gamma must be a number .*'0.9'"),
+        (lambda m: value_iteration(m, gamma=True), TypeError, "gamma must be a number .*True"),
+        (
+            lambda m: value_iteration(m, gamma=0.9, tolerance=0),
+            ValueError,
+            "tolerance must be a fin",
+        ),
         (lambda m: value_iteration(m, gamma=0.9, tolerance=np.inf), ValueError, "tolerance .* inf"),
         (lambda m: value_iteration(m, gamma=0.9, tolerance=None), TypeError, "tolerance must be a"),
         (lambda m: q_value_iteration(m, gamma=0.9, threshold=-1), ValueError, "threshold .* -1"),
@@ -525,31 +529,39 @@ def test_gamma_out_of_range(planner, gamma):
         (
             lambda m: policy_iteration(m, gamma=0.9, evaluation_threshold=0),
             ValueError,
-            "evaluation_threshold must be positive",
+            "evaluation_threshold must be a .* above 0 or None, got 0",
         ),
         (
             lambda m: policy_iteration(m, gamma=0.9, initial_policy=[0, 1]),
             ValueError,
-            r"initial_policy must have shape \(112,\), not \(2,\)",
+            r"initial_policy must be .* shape \(112\), got \(2,\)",
         ),
         (
             lambda m: policy_evaluation(m, np.full(112, 4), gamma=0.9),
             ValueError,
-            "policy must lie in 0..3, in state 0 it is 4",
+            "policy must be an array of integers from 0 to 3, in state 0 it is 4",
         ),
         (lambda m: policy_evaluation(m, np.full(112, -1), gamma=0.9), ValueError, "it is -1"),
-        (lambda m: policy_evaluation(m, np.zeros(112), gamma=0.9), TypeError, "policy must hold"),
-        (lambda m: backup(m, np.zeros(3), gamma=0.9), ValueError, r"V must have shape \(112,\)"),
+        (
+            lambda m: policy_evaluation(m, np.zeros(112), gamma=0.9),
+            TypeError,
+            "policy .*integers .*float64",
+        ),
+        (lambda m: backup(m, np.zeros(3), gamma=0.9), ValueError, r"V must be .* shape \(112\)"),
         (
             lambda m: backup(m, np.where(np.arange(112) == 1, np.nan, 0.0), gamma=0.9),
             ValueError,
-            "V must be finite, in state 1 it is nan",
+            r"V must be finite, at \(1,\) it is nan",
         ),
-        (lambda m: backup(m, ["a"] * 112, gamma=0.9), TypeError, "V must hold numbers"),
+        (lambda m: backup(m, ["a"] * 112, gamma=0.9), TypeError, "V must be an array of numbers"),
         (lambda m: backup(m, [[1.0], []], gamma=0.9), ValueError, "V must be an array of numbers"),
-        (lambda m: greedy_policy([1.0, 2.0]), ValueError, "Q must have shape"),
-        (lambda m: greedy_policy([[1.0], [np.nan]]), ValueError, "Q must be finite, in state 1"),
-        (lambda m: optimal_actions([[1.0]], tolerance=-1), ValueError, "tolerance must be pos"),
+        (lambda m: greedy_policy([1.0, 2.0]), ValueError, "Q must be an array of numbers of shape"),
+        (lambda m: greedy_policy([[1.0], [np.nan]]), ValueError, r"Q must be finite, at \(1, 0\)"),
+        (
+            lambda m: optimal_actions([[1.0]], tolerance=-1),
+            ValueError,
+            "tolerance must be a fin",
+        ),
     ],
 )
 def test_wrong_arguments(call, error, message):

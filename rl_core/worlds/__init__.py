@@ -1,0 +1,1 @@
+"""What the algorithms act in, and how it is read, opened and played."""

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rl_core.compiled import compiled
-from rl_core.mdp import MDP
 
 TIE = 1e-10
 """Actions whose values differ by less than this fraction of the state's largest |Q| are tied: it is
@@ -48,16 +47,6 @@ class Transitions(NamedTuple):
     successor: NDArray[np.int32]
     probability: NDArray[np.float64]
     own_rows: int
-
-
-def arrays(mdp: MDP) -> tuple[Transitions, NDArray[np.float64]]:
-    """Return transitions and rewards as the kernels take them."""
-    shared = mdp.probability.strides[0] == 0 and mdp.n_states > 1
-    probability = mdp.probability[:1] if shared else mdp.probability
-    transitions = Transitions(
-        np.ascontiguousarray(mdp.successor), np.ascontiguousarray(probability), int(not shared)
-    )
-    return transitions, np.ascontiguousarray(mdp.reward)
 
 
 @compiled

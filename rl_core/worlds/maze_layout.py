@@ -5,14 +5,13 @@ A layout has one letter a cell: `S` start, `G` goal, `F` flag, `W` wall, `O` ope
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from numbers import Integral, Real
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from rl_core import checks
 from rl_core.compiled import compiled
 
 COURSE_LAYOUT = """\
@@ -110,8 +109,16 @@ def random_layout(
     >>> len(find(letters, "W"))
     6
     """
-    n_walls = _check_random(rows, columns, flags, wall_fraction, rng)
-    rows, columns = int(rows), int(columns)  # a narrow NumPy integer would overflow below
+    rows = checks.integer("rows", rows, 1)
+    columns = checks.integer("columns", columns, 1)
+    flags = checks.integer("flags", flags, 0, MAX_FLAGS)
+    wall_fraction = checks.number("wall_fraction", wall_fraction, 0, below=1)
+    checks.generator("rng", rng)
+    n_cells = rows * columns
+    checks.require(n_cells < 2**31, "rows * columns", n_cells, "below 2**31")
+    n_walls = round(wall_fraction * n_cells)
+    free, needed = n_cells - n_walls, f"such that {2 + flags} cells are free, with {flags} flags"
+    checks.require(free >= 2 + flags, "rows, columns and wall_fraction", free, needed)
     start = int(rng.integers(rows * columns))
     parent = _spanning_tree(rows, columns, start, rng)
     walls, leaves = _wall_up_leaves(parent, n_walls, rng)
@@ -128,40 +135,33 @@ def _rows(layout: object) -> list[str]:
     """Return the rows of a layout, checked to be equally long and of known letters."""
     if isinstance(layout, str):
         layout = layout.strip().splitlines()
-    lines: list[Any] = list(layout) if isinstance(layout, Iterable) else [layout]
-    if not all(isinstance(line, str) for line in lines):
-        raise TypeError("layout must be a text or a sequence of texts, one a row")
+    allowed = "a text or a sequence of texts, one a row"
+    lines = [
+        checks.instance("layout", line, str, allowed)
+        for line in checks.instance("layout", layout, Sequence, allowed)
+    ]
     rows = ["".join(line.split()) for line in lines]
-    if not rows or not rows[0]:
-        raise ValueError("layout must have at least one row with at least one letter")
+    checks.require(rows and rows[0], "layout", layout, "at least one row with at least one letter")
     for number, row in enumerate(rows):
-        if len(row) != len(rows[0]):
-            raise ValueError(
-                "layout must have rows of equal length: "
-                f"row {number} has {len(row)} letters, row 0 has {len(rows[0])}"
-            )
-        if not LETTERS.issuperset(row):
-            column = next(i for i, letter in enumerate(row) if letter not in LETTERS)
-            raise ValueError(
-                f"layout has the unknown letter {row[column]!r} at row {number}, column {column}; "
-                "allowed are S, G, F, W, O"
-            )
+        found = f"{len(row)} letters in row {number}, {len(rows[0])} in row 0"
+        _require(len(row) == len(rows[0]), "of rows of equal length", found)
+        for column in (row.index(letter) for letter in set(row) - LETTERS):
+            found = f"{row[column]!r} at row {number}, column {column}"
+            _require(False, "of the letters S, G, F, W, O", found)
     return rows
+
+
+def _require(condition: object, allowed: str, found: str) -> None:
+    if not condition:
+        raise ValueError(f"layout must be {allowed}, got {found}")
 
 
 def _check_start_and_flags(letters: NDArray[np.str_]) -> None:
     starts = find(letters, "S")
-    if not starts:
-        raise ValueError("layout must have one start S, it has none")
-    if len(starts) > 1:
-        (first_row, first_column), (row, column) = starts[:2]
-        raise ValueError(
-            f"layout must have one start S, it has {len(starts)}: "
-            f"at row {first_row}, column {first_column} and row {row}, column {column}"
-        )
+    places = " and ".join(f"at row {row}, column {column}" for row, column in starts[:2])
+    _require(len(starts) == 1, "with one start S", f"{len(starts)} {places}".rstrip())
     n_flags = len(find(letters, "F"))
-    if n_flags > MAX_FLAGS:
-        raise ValueError(f"layout must have at most {MAX_FLAGS} flags F, it has {n_flags}")
+    _require(n_flags <= MAX_FLAGS, f"with at most {MAX_FLAGS} flags F", str(n_flags))
 
 
 def _check_goals(letters: NDArray[np.str_]) -> None:
@@ -170,53 +170,14 @@ def _check_goals(letters: NDArray[np.str_]) -> None:
     A slip does not matter here: whatever its probability, some action leads in every direction.
     """
     goals = find(letters, "G")
-    if not goals:
-        raise ValueError("layout must have a goal G, it has none")
+    _require(goals, "with a goal G", "none")
     # Regions of cells joined by moves, but not through a goal, for there the episode ends.
     region, _ = ndimage.label((letters != "W") & (letters != "G"))
     (start,) = find(letters, "S")
     reached = ndimage.binary_dilation(region == region[start])
     for row, column in goals:
-        if not reached[row, column]:
-            raise ValueError(
-                f"layout has a goal that cannot be reached, at row {row}, column {column}"
-            )
-
-
-def _check_random(
-    rows: int, columns: int, flags: int, wall_fraction: float, rng: np.random.Generator
-) -> int:
-    """Return the number of walls to place."""
-    sizes: tuple[tuple[str, object, int], ...] = (
-        ("rows", rows, 1),
-        ("columns", columns, 1),
-        ("flags", flags, 0),
-    )
-    for name, value, least in sizes:
-        if not isinstance(value, Integral):
-            raise TypeError(f"{name} must be an integer, not {type(value).__name__}")
-        if value < least:
-            raise ValueError(f"{name} must be at least {least}, it is {value}")
-    if flags > MAX_FLAGS:
-        raise ValueError(f"flags must be at most {MAX_FLAGS}, it is {flags}")
-    fraction: object = wall_fraction
-    if not isinstance(fraction, Real):
-        raise TypeError(f"wall_fraction must be a number, not {type(fraction).__name__}")
-    if not 0 <= wall_fraction < 1:
-        raise ValueError(f"wall_fraction must lie in [0, 1), it is {wall_fraction}")
-    if not isinstance(rng, np.random.Generator):
-        raise TypeError(f"rng must be a numpy.random.Generator, not {type(rng).__name__}")
-    n_cells = int(rows) * int(columns)
-    if n_cells >= 2**31:
-        raise ValueError(f"rows * columns must be below 2**31, it is {n_cells}")
-    n_walls = round(wall_fraction * n_cells)
-    n_free = n_cells - n_walls
-    if n_free < 2 + flags:
-        raise ValueError(
-            f"rows {rows}, columns {columns} and wall_fraction {wall_fraction} leave {n_free} free "
-            f"cells; start, goal and {flags} flags need {2 + flags}"
-        )
-    return n_walls
+        found = f"one that cannot be reached, at row {row}, column {column}"
+        _require(reached[row, column], "with goals that can be reached from the start", found)
 
 
 @compiled
