@@ -23,9 +23,9 @@ from torch.distributions import Categorical as TorchCategorical
 from torch.distributions import Normal
 
 from bench.table import comparison
-from rl_core import networks, policies, reinforce
-from rl_core.episodes import CompiledEnvironment
-from rl_core.policies import Gaussian, make_policy
+from rl_core import reinforce
+from rl_core.kernels import likelihood, networks
+from rl_core.policies import MLP, Categorical, Gaussian, initial_parameters, make_policy
 from rl_core.reinforce import ReinforceConfig
 
 SEEDS = range(30)
@@ -219,10 +219,8 @@ def stacked_update(n_networks: int, n: int) -> Callable[[], int]:
 def compiled_update(n_networks: int, n: int) -> Callable[[], int]:
     """The same with the compiled networks, one after the other."""
     rng = np.random.default_rng(0)
-    policy = make_policy(policies.Categorical(), (10, 20), 6, 3, 0)
-    stack = [
-        policies.initial_parameters(policy, policies.Categorical(), rng) for _ in range(n_networks)
-    ]
+    policy = make_policy(Categorical(), (10, 20), 6, 3, 0)
+    stack = [initial_parameters(policy, Categorical(), rng) for _ in range(n_networks)]
     moments = np.zeros((n_networks, 2, stack[0].size), np.float32)
     gradient = np.empty_like(stack[0])
     units, deltas = np.empty((2, policy.sizes.sum(), networks.padded(n)), np.float32)
@@ -232,7 +230,7 @@ def compiled_update(n_networks: int, n: int) -> Callable[[], int]:
 
     def update() -> int:
         for parameters, (first, second) in zip(stack, moments, strict=True):
-            policies.likelihood_gradient(
+            likelihood.likelihood_gradient(
                 policy, parameters, states, actions, v, units, deltas, gradient
             )
             networks.adam_step(parameters, gradient, first, second, 1, 1e-3)

@@ -219,7 +219,9 @@ def film(name, env_id, text):
     seed, arrays = study.median_seed(curves, arm), results.arrays(arm)
     trained, untrained = (weights_of(arrays, seed, moment) for moment in ("", "initial/"))
     after = rollout(env_id, as_learned(config, trained), np.random.default_rng(0), 1_000)
-    before = rollout(env_id, as_learned(config, untrained), np.random.default_rng(0), len(after.rewards))
+    before = rollout(
+        env_id, as_learned(config, untrained), np.random.default_rng(0), len(after.rewards)
+    )
     glue(f"{name}-seed", seed, display=False)
     return drawings.before_and_after(env_id, before, after, description=text)
 

@@ -272,8 +272,9 @@ for title, arm in (
 ):
     position = study.median_seed(curves, arm)
     weights = weights_of(results.arrays(arm), position)
-    policies[title] = weights, rollout(
-        "MountainCar-v0", of_values(weights), np.random.default_rng(0), 1_000
+    policies[title] = (
+        weights,
+        rollout("MountainCar-v0", of_values(weights), np.random.default_rng(0), 1_000),
     )
 drawings.plane_table(policies).to_csv(DATA / "figure_s4_4.csv", index=False)
 drawings.state_plane(policies)

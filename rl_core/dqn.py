@@ -12,17 +12,6 @@
 `play` is the loop and `TorchLearner` the learner. A terminal s' has no value; a step cut short by a
 cap is bootstrapped.
 
-With these settings the average return of the last 50 training episodes of CartPole-v1 is 450
-or more for most seeds (`tests/test_dqn.py` holds them to it):
-
-    config = DQNConfig(
-        network=MLP((64, 64)), optimiser="adam", learning_rate=1e-3,
-        batch_size=128, memory_size=100_000, learning_starts=500,
-        update_every=2, copy_every=100, epsilon=Linear(1.0, 0.0, steps=5_000),
-        shaping=Shaping("rl_core.worlds.shaping:balance"), max_env_steps=80_000,
-    )
-    run = dqn("CartPole-v1", config, episodes=2_000, seeds=range(10))
-
 Sources: V. Mnih et al. (2015), Human-level control through deep reinforcement learning; R. S.
 Sutton and A. G. Barto, Reinforcement Learning: An Introduction (2018), sections 6.5 and 16.5.
 """
@@ -92,10 +81,9 @@ class DQNConfig:
         Transitions an update.
     memory_size : int
         Transitions kept, at least a batch. As many as a batch: no replay, only the latest ones.
-    learning_starts : int
-        Environment steps before the first update. The report waits until the memory is full.
-    update_every : int
-        Environment steps between two updates.
+    learning_starts, update_every : int
+        Environment steps before the first update (the report waits until the memory is full), and
+        from one to the next.
     copy_every : int
         Updates between two copies to the fixed network. 1: no fixed target.
     epsilon : float, Linear or HalfWay
@@ -114,8 +102,8 @@ class DQNConfig:
     max_episode_steps : int or None
         Where to stop an episode that has not ended. None: nowhere.
     max_env_steps : int or None
-        Budget of environment steps a seed. The episode in which it is used up is stopped there and
-        is the seed's last. None: no limit.
+        Budget of environment steps a seed: where it is used up the last episode is stopped. None:
+        no limit.
     engine : {"compiled", "torch"} or None
         What learns. None: machine code for an MLP, torch for a Module.
 
@@ -295,17 +283,8 @@ def play(
     """Play and learn from one episode; `observation`, its first, is overwritten.
 
     Plain Python as it stands, for any world and network; `_play_compiled` is the same text for
-    compiled tasks and perceptrons.
-
-    Returns
-    -------
-    steps : int
-    total : float
-        Undiscounted sum of the environment's own rewards.
-    terminated : bool
-        False if the episode was stopped or truncated.
-    outcome : int
-        `WENT_ON`, `DIVERGED` or `SHAPED_NAN`.
+    compiled tasks and perceptrons. Returns the steps, the sum of the environment's own rewards,
+    whether the episode terminated, and how the learning went.
     """
     settings, counts = learner.settings, learner.counts
     following, action = np.empty_like(observation), np.empty(1, np.float32)
@@ -405,8 +384,6 @@ def _train(world: World, config: DQNConfig, training: Training) -> None:
 def check_dqn(env: EnvironmentLike, config: DQNConfig) -> None:
     """Raise what `dqn` would raise for an environment and a configuration; run nothing.
 
-    `rl_core.experiments.run` calls it for every arm before it begins with any.
-
     Raises
     ------
     ValueError, TypeError
@@ -433,14 +410,12 @@ def dqn(
 ) -> Run:
     """Train one network a seed with DQN.
 
-    Seeds share nothing, the memory included: a seed gives the same bits alone and among any others.
-
     Parameters
     ----------
     env : str, Make, Task, gymnasium.Env or callable
         With Box observations and Discrete actions; see `rl_core.worlds.environments.open_world`.
-        Acrobot-v1 and MountainCar-v0 are played compiled and without time limit. An environment that
-        is given ready made is for one seed only, as what it remembers would go from seed to seed.
+        Acrobot-v1 and MountainCar-v0 are played compiled and without time limit. One that is given
+        ready made is for one seed only, as what it remembers would go from seed to seed.
     config : DQNConfig
     episodes, seeds, snapshots, progress
         See `rl_core.training.train_seeds`. The initial weights are kept in any case.
@@ -448,14 +423,10 @@ def dqn(
     Returns
     -------
     Run
-        `table` has the columns `seed`, `episode` (from 1), `steps`, `return` (undiscounted, of the
-        environment's own rewards also where they are shaped), `terminated` (false: stopped by a
-        cap) and `env_steps` (of this seed so far). Rows of a seed that diverged or used up its
-        budget end there, that episode included.
-        `arrays` holds, with one row a seed, the last weights as `layer0.weight` of shape
-        (seeds, inputs, outputs), `layer0.bias` and so on, and copies under `initial/...` and
-        `episode20/...`, which are the last weights of seeds that ended before. `failures` names
-        seeds whose returns, loss or weights were no longer finite.
+        The returns of its table are of the environment's own rewards also where they are shaped. Its
+        arrays hold the last weights, those of an MLP as `layer0.weight` of shape (seeds, inputs,
+        outputs), `layer0.bias` and so on, those of a module under its own names, and copies under
+        `initial/...` and `episode20/...`.
 
     Raises
     ------

@@ -175,7 +175,7 @@ def check_epsilon(name: str, value: object) -> Epsilon:
     --------
     >>> check_epsilon("epsilon", Linear(1, 0, episodes=5))
     Traceback (most recent call last):
-    ValueError: epsilon must be a schedule by the environment step, got Linear(start=1.0, end=0.0,...
+    ValueError: epsilon must be a schedule by the environment step, got Linear(start=1.0, ...
     """
     if isinstance(value, HalfWay):
         return value

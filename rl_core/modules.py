@@ -92,7 +92,8 @@ def make_module(
                 shape = tuple(module(torch.zeros(2, n_inputs)).shape)
         except (RuntimeError, TypeError, AttributeError, ValueError) as error:
             raise ValueError(
-                f"network must take inputs of shape (batch, {n_inputs}), {network.function} raises: {error}"
+                f"network must take inputs of shape (batch, {n_inputs}), "
+                f"{network.function} raises: {error}"
             ) from error
     if shape != (2, n_outputs):
         raise ValueError(
@@ -169,7 +170,7 @@ class Adam(torch.optim.Optimizer):
 
     @torch.no_grad()
     def step(self, closure: None = None) -> None:  # type: ignore[override]
-        """M <- b1 m + (1 - b1) g, v <- b2 v + (1 - b2) g^2, theta <- theta - a_t m / (sqrt(v) + eps)."""
+        """Descend: theta <- theta - alpha_t m / (sqrt(v) + 1e-8)."""
         for theta, alpha, state in _with_gradient(self):
             m, v, t = (
                 *(state.setdefault(key, torch.zeros_like(theta)) for key in "mv"),
@@ -199,7 +200,7 @@ class RMSProp(torch.optim.Optimizer):
 
     @torch.no_grad()
     def step(self, closure: None = None) -> None:  # type: ignore[override]
-        """V <- 0.9 v + 0.1 g^2, theta <- theta - alpha g / sqrt(v + 1e-10); v begins at 1."""
+        """Descend: theta <- theta - alpha g / sqrt(v + 1e-10), where v begins at 1."""
         for theta, alpha, state in _with_gradient(self):
             v = state.setdefault("v", torch.ones_like(theta))
             v.mul_(0.9).addcmul_(theta.grad, theta.grad, value=0.1)

@@ -139,7 +139,7 @@ class Training:
                 return
 
     def max_steps(self, *limits: int | None) -> int:
-        """Return where an episode has to stop: at the least of some limits and the budget's rest."""
+        """Return where an episode has to stop: at the least of limits and the budget's rest."""
         return min(self._budget - self.env_steps, *(limit or sys.maxsize for limit in limits))
 
     def add(self, steps: int, total: float, terminated: bool) -> None:

@@ -18,8 +18,7 @@ import pandas as pd
 
 from report.claims import Claim, Criterion, Evidence, Finding
 from report.seeds import SEEDS
-from rl_core.experiments import Arm
-from rl_core.experiments import Results, run
+from rl_core.experiments import Arm, Results, run
 from rl_core.policies import MLP, Gaussian
 from rl_core.reinforce import ReinforceConfig, reinforce
 from rl_core.statistics import (

@@ -17,14 +17,11 @@ import pandas as pd
 
 from report.claims import Claim, Criterion, Evidence, Finding
 from report.seeds import SEEDS
-from rl_core.experiments import Arm
 from rl_core.dqn import DQNConfig, dqn
+from rl_core.evaluation import evaluate, of_values
+from rl_core.experiments import Arm, Results, run
 from rl_core.exploration import Linear
 from rl_core.policies import MLP
-from rl_core.evaluation import evaluate, of_values
-from rl_core.experiments import Results, run
-from rl_core.training import weights_of
-from rl_core.worlds.shaping import Shaping
 from rl_core.statistics import (
     bootstrap_interval,
     episodes_to_threshold,
@@ -33,6 +30,8 @@ from rl_core.statistics import (
     probability_of_improvement,
     proportion_interval,
 )
+from rl_core.training import weights_of
+from rl_core.worlds.shaping import Shaping
 
 EPISODES = 100  # of figures 12 and 13
 BUDGET = {"Acrobot": 25_000, "MountainCar": 45_000}  # environment steps a seed, for the causes

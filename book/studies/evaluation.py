@@ -16,14 +16,13 @@ from scipy.stats import kendalltau
 
 from report.claims import Claim, Criterion, Evidence, Finding
 from report.seeds import SEEDS
-from rl_core.experiments import Arm
-from rl_core.worlds.discretise import gridded
 from rl_core.evaluation import Agent, as_learned, evaluate, evaluate_table, greedy, of_values
-from rl_core.experiments import Results, run
+from rl_core.experiments import Arm, Results, run
 from rl_core.exploration import EpsilonGreedy, Linear, Trials
 from rl_core.q_learning import QLearningConfig, q_learning
-from rl_core.training import weights_of
 from rl_core.statistics import bootstrap_interval, proportion_interval
+from rl_core.training import weights_of
+from rl_core.worlds.discretise import gridded
 from studies import continuous as continuous_study
 from studies import dqn as dqn_study
 from studies import reinforce as reinforce_study
@@ -68,9 +67,7 @@ def table_arm(name: str, bins: int, limit: int = TABLE_CAP) -> Arm:
     """A table on an environment; under a time limit if one is given."""
     under = "" if limit == TABLE_CAP else ", under the limit"
     config = table_config(name, bins, limit)
-    return Arm(
-        f"{name}, table, {bins} bins{under}", q_learning, ENV[name], config, TABLE_EPISODES
-    )
+    return Arm(f"{name}, table, {bins} bins{under}", q_learning, ENV[name], config, TABLE_EPISODES)
 
 
 def chosen_bins(name: str) -> int:

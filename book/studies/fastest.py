@@ -21,10 +21,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rl_core.checks import floats, integer, one_of, require
 from rl_core.kernels.compiled import compiled
 from rl_core.mdp import MDP
 from rl_core.planning import value_iteration
-from rl_core.checks import floats, integer, one_of, require
 from rl_core.worlds.tasks import TASKS, Kernel
 
 PUSHES = np.array([-1.0, 0.0, 1.0])

@@ -48,8 +48,8 @@ def unpack(policy: Policy, parameters: NDArray[np.float32]) -> dict[str, NDArray
     Returns
     -------
     dict of str to float32 array
-        `layer0.weight`, `layer0.bias`, ... as `rl_core.kernels.networks.unpack` names them, and for a
-        Gaussian `log_sigma` of shape (..., action_width).
+        `layer0.weight`, `layer0.bias`, ... as `networks.unpack` names them, and for a Gaussian
+        `log_sigma` of shape (..., action_width).
     """
     named = networks.unpack(policy.sizes.tolist(), parameters)
     if policy.gaussian:

@@ -247,8 +247,8 @@ class Discretised(gymnasium.Wrapper[Any, Any, Any, Any]):
         fits = flat.size == self.grid.bins.size and flat.dtype.kind in "fiub"
         if not fits or np.isnan(flat).any():
             raise ValueError(
-                f"env must keep to its spaces: from {self.env}, the observation {observation!r} came, "
-                f"which has no cell; its observation space is {self.env.observation_space}"
+                f"env must keep to its spaces: from {self.env}, the observation {observation!r} "
+                f"came, which has no cell; its observation space is {self.env.observation_space}"
             )
         return int(cell(self.grid, flat.astype(np.float32)))
 

@@ -141,8 +141,8 @@ class GymnasiumWorld:
     def _refuse(self, what: str) -> None:
         name = self._environment.spec.id if self._environment.spec else self._environment
         raise ValueError(
-            f"env must keep to its spaces: from {name}, at step {self._steps} of an episode, {what}; "
-            f"its observation space is {self._space}"
+            f"env must keep to its spaces: from {name}, at step {self._steps} of an episode, "
+            f"{what}; its observation space is {self._space}"
         )
 
     def close(self) -> None:
