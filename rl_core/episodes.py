@@ -176,6 +176,7 @@ def play_episode(
     """
     both = isinstance(world, TaskWorld) and isinstance(actor, Actor)
     go_on = _play_compiled if both else play
+    max_steps = min(max_steps, world.max_episode_steps or max_steps)
     trajectory.observations[0] = world.reset()
     steps, terminated, truncated = 0, False, False
     while True:

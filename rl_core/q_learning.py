@@ -562,6 +562,10 @@ def _train(
     draws, appraisal = tabular.spawn_draws(seed, 2), new_appraisal(yardstick)
     if isinstance(world, Played):
         world.env.reset(seed=seed)  # for what else the environment draws from
+    if isinstance(world, GriddedTask) and world.max_steps > 0:
+        trial_max_steps = min(task.trial_max_steps, world.max_steps)
+        max_steps = min(task.max_steps, world.max_steps)
+        task = task._replace(max_steps=max_steps, trial_max_steps=trial_max_steps)
     first, episodes = 0, len(record)
     for last in sorted({*snapshots, episodes}):
         stopped = learn(

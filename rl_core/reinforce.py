@@ -319,7 +319,7 @@ def _train(world: World, config: ReinforceConfig, training: Training) -> None:
     trajectory = Trajectory(world.n_observations, actor.policy.action_width)
     centre, scale = config.normalise != "none", config.normalise == "standard"
     for episode in training.course(config.max_env_steps):
-        max_steps = training.max_steps(config.max_episode_steps, world.max_episode_steps)
+        max_steps = training.max_steps(config.max_episode_steps)
         steps, terminated = play_episode(world, actor, streams.policy, max_steps, trajectory)
         observations, actions, rewards = trajectory.first(steps)
         with np.errstate(invalid="ignore", over="ignore"):

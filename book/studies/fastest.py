@@ -25,7 +25,8 @@ from rl_core.checks import floats, integer, one_of, require
 from rl_core.kernels.compiled import compiled
 from rl_core.mdp import MDP
 from rl_core.planning import value_iteration
-from rl_core.worlds.tasks import TASKS, Kernel
+from rl_core.worlds.tasks import Kernel
+from rl_core.worlds.twins import TASKS
 
 PUSHES = np.array([-1.0, 0.0, 1.0])
 """Full force either way, or none: in the fastest way up there is no use for half of it."""

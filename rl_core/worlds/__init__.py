@@ -1,1 +1,1 @@
-"""What the algorithms act in, and how it is read, opened and played."""
+"""The worlds that agents live in."""

@@ -30,7 +30,8 @@ from rl_core.checks import floats, instance, integer, integers, require
 from rl_core.compiled import compiled
 from rl_core.worlds.environments import EnvironmentLike, opened
 from rl_core.worlds.names import find
-from rl_core.worlds.tasks import Kernel, Task, twin
+from rl_core.worlds.tasks import Kernel, Task
+from rl_core.worlds.twins import twin
 
 MAX_CELLS = 2**31 - 1
 
@@ -289,7 +290,7 @@ def gridded(
     Parameters
     ----------
     env : str or Task
-        An id of `rl_core.worlds.tasks.TASKS`, the import path of a task, or a task.
+        An id of `rl_core.worlds.twins.TASKS`, the import path of a task, or a task.
     bins, levels
         As for `Discretised`.
 

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from rl_core.compiled import compiled
 from rl_core.worlds.names import Make, find, make_environment
-from rl_core.worlds.tasks import Kernel, Task, twin
+from rl_core.worlds.tasks import Kernel, Task
+from rl_core.worlds.twins import twin
 
 EnvironmentLike = (
     str | Make | Task | gymnasium.Env[Any, Any] | Callable[[], gymnasium.Env[Any, Any]]
@@ -229,7 +230,7 @@ def open_world(env: EnvironmentLike) -> World:
     Parameters
     ----------
     env : str, Make, Task, gymnasium.Env or callable
-        The ids in `rl_core.worlds.tasks.TASKS` are played compiled, with the time limit that the
+        The ids in `rl_core.worlds.twins.TASKS` are played compiled, with the time limit that the
         task declares. Any other id is made by Gymnasium, with the limit it is registered with, and
         so is an id with arguments (`Make`). An import path "module:name" leads to a task, or to a
         function or class that makes an environment. An environment is taken as it is.

@@ -16,16 +16,19 @@ loop is compiled once and then plays every task, also those that were written af
 """
 
 import inspect
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from types import FunctionType as PlainFunction
 from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
+from numba.core import types
 from numba.core.registry import CPUDispatcher
-from numba.core.types import FunctionType, Tuple, boolean, float32, float64, void
+from numba.core.types import FunctionType, boolean, float32, float64, void
 from numba.core.types.npytypes import NumPyRandomGeneratorType
 from numpy.typing import NDArray
 
@@ -39,9 +42,10 @@ Start = Callable[[np.random.Generator, State, Observation], None]
 Step = Callable[[State, Action], tuple[float, bool]]
 Observe = Callable[[State, Observation], None]
 
+_OUTCOME = types.Tuple((float64, boolean))  # type: ignore[no-untyped-call]
 _SIGNATURES: dict[str, Any] = {
     "start": void(NumPyRandomGeneratorType("npy_rng"), float64[::1], float32[::1]),
-    "step": Tuple((float64, boolean))(float64[::1], float32[::1]),
+    "step": _OUTCOME(float64[::1], float32[::1]),
     "observe": void(float64[::1], float32[::1]),
 }
 _ARGUMENTS = {
@@ -73,7 +77,7 @@ class Kernel(NamedTuple):
     ...     return steps
     >>> observation, push_left = np.empty(4, np.float32), np.zeros(1, np.float32)
     >>> count_steps(CartPole.kernel(), np.random.default_rng(0), observation, push_left)
-    10
+    11
     """
 
     start: Start
@@ -135,7 +139,7 @@ class Task:
     @property
     def n_observations(self) -> int:
         """Length of the observation."""
-        return int(np.prod(self.observation_space.shape))
+        return math.prod(self.observation_space.shape)
 
     @property
     def n_actions(self) -> int:
@@ -145,8 +149,9 @@ class Task:
     @property
     def action_dimensions(self) -> int:
         """Length of a continuous action; 0 where actions are discrete."""
-        box = isinstance(self.action_space, spaces.Box)
-        return int(np.prod(self.action_space.shape)) if box else 0
+        return (
+            math.prod(self.action_space.shape) if isinstance(self.action_space, spaces.Box) else 0
+        )
 
     def kernel(self) -> Kernel:
         """Return the compiled functions, compiled at the first call, and a new state of zeros.
@@ -156,8 +161,8 @@ class Task:
         ValueError
             If numba cannot compile a function for the vectors described in the module.
         """
-        functions = [_first_class(name, getattr(self, name)) for name in _SIGNATURES]
-        return Kernel(*functions, np.zeros(self.n_state))
+        compiled_functions = {name: _first_class(name, getattr(self, name)) for name in _SIGNATURES}
+        return Kernel(**compiled_functions, state=np.zeros(self.n_state))
 
 
 def task(
@@ -213,10 +218,11 @@ def task(
 
     def decorate(described: type) -> Task:
         instance("task", described, type, "put on a class")
+        functions: dict[str, Any] = {name: getattr(described, name, None) for name in _SIGNATURES}
         return Task(
-            described.__qualname__,
-            described.__module__,
-            *(getattr(described, name, None) for name in _SIGNATURES),  # type: ignore[arg-type]
+            name=described.__qualname__,
+            module=described.__module__,
+            **functions,
             n_state=n_state,
             observation_space=observation_space,
             action_space=action_space,
@@ -240,14 +246,12 @@ def clip(value: float, low: float, high: float) -> float:
 
 def _check_function(name: str, function: object) -> None:
     allowed = f"a plain function of {_ARGUMENTS[name]}"
-    if not inspect.isfunction(function):
-        instance(name, function, (), allowed)
-    arguments = inspect.signature(function).parameters  # type: ignore[arg-type]
+    arguments = inspect.signature(instance(name, function, PlainFunction, allowed)).parameters
     wanted = len(_SIGNATURES[name].args)
     require(len(arguments) == wanted, name, f"({', '.join(arguments)})", allowed)
 
 
-class _FirstClass(CPUDispatcher):  # type: ignore[misc]
+class _FirstClass(CPUDispatcher):
     """A compiled function whose type is its signature, not itself.
 
     `numba.cfunc` makes such functions too, but an exception in one of those is printed and lost.
@@ -263,25 +267,18 @@ def _first_class(name: str, function: Callable[..., Any]) -> Any:
     signature, file = _SIGNATURES[name], Path(function.__code__.co_filename)
     own = file.is_relative_to(Path(__file__).parents[1])
     options = {"nopython": True, "nogil": True, "error_model": "numpy", "boundscheck": True}
-    made = _FirstClass(function, targetoptions=options)
+    made: Any = _FirstClass(function, targetoptions=options)
     if own:  # others' machine code would be kept under a stamp that does not know their constants
-        cached: Any = compiled(function)
-        made._cache = cached._cache
+        kept: Any = compiled(function)
+        made._cache = kept._cache
     try:
         made.compile(signature)
-    except Exception as error:
-        reason = [line.strip() for line in str(error).splitlines() if line.strip()]
+    except Exception as error:  # numba has many
+        lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+        reason = " ".join(line for line in lines[:4] if not line.startswith("Failed in"))
         raise ValueError(
-            f"{name} must be a function that numba compiles for {signature}, "
-            f"got {function.__module__}.{function.__qualname__}: {' '.join(reason[:2])}"
+            f"{name} must be a function of {_ARGUMENTS[name]} that numba compiles, "
+            f"got {function.__module__}.{function.__qualname__}: {reason}"
         ) from error
     made.disable_compile()
     return made
-
-
-def twin(id):
-    """Temp."""
-    import importlib
-
-    TASKS = importlib.import_module("rl_core.worlds._temp").TASKS
-    return TASKS.get(id)
