@@ -71,7 +71,7 @@ from rl_core.mdp import MDP
 from rl_core.planning import optimal_actions, value_iteration
 from rl_core.training import Failure, Progress, Run
 from rl_core.worlds import tabular
-from rl_core.worlds.discretise import Discretised, checked_bins, gridded, task_of
+from rl_core.worlds.discretise import Discretised, GriddedTask, checked_bins, gridded, task_of
 from rl_core.worlds.environments import EnvironmentLike, one_seed_of
 from rl_core.worlds.tabular import DiscreteWorld, Draws, Played, start, step
 
