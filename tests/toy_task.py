@@ -37,9 +37,4 @@ class Corridor:
         observation[0] = state[0] / LENGTH
 
 
-def corridor_steps(start):
-    """Steps to the end when every action is 1."""
-    return LENGTH - start
-
-
 RIGHT, NOWHERE = np.ones(1, np.float32), np.full(1, 7, np.float32)

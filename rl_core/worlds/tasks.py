@@ -17,6 +17,7 @@ loop is compiled once and then plays every task, also those that were written af
 
 import inspect
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -274,8 +275,8 @@ def _first_class(name: str, function: Callable[..., Any]) -> Any:
     try:
         made.compile(signature)
     except Exception as error:  # numba has many
-        lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-        reason = " ".join(line for line in lines[:4] if not line.startswith("Failed in"))
+        told = re.sub(r"^Failed in .*?\) ", "", " ".join(str(error).split()))
+        reason = re.split(r" (?:During:|File|There are) ", told)[0]
         raise ValueError(
             f"{name} must be a function of {_ARGUMENTS[name]} that numba compiles, "
             f"got {function.__module__}.{function.__qualname__}: {reason}"
