@@ -176,12 +176,12 @@ def where_time_goes(name: str) -> str:
 
         return call
 
-    play = timed("episodes", CompiledEnvironment.play)
-    learner = timed("learner", reinforce._learn)
+    play = timed("episodes", reinforce.play_episode)
+    learner = timed("learner", likelihood.learn)
     start = time.perf_counter()
     with (
-        mock.patch.object(CompiledEnvironment, "play", lambda *a: play(*a)),
-        mock.patch.object(reinforce, "_learn", learner),
+        mock.patch.object(reinforce, "play_episode", play),
+        mock.patch.object(likelihood, "learn", learner),
     ):
         steps = ours(name, episodes=WHOLE, budget=BUDGET)
     seconds = time.perf_counter() - start
