@@ -17,9 +17,8 @@ import numpy as np
 import pandas as pd
 from seeds import SEEDS
 
-from rl_core.arm import Arm
 from rl_core.claims import Claim, Criterion, Evidence, Finding
-from rl_core.experiments import Results, run
+from rl_core.experiments import Arm, Results, run
 from rl_core.policies import Gaussian
 from rl_core.reinforce import ReinforceConfig, reinforce
 from rl_core.statistics import (

@@ -16,12 +16,11 @@ import numpy as np
 import pandas as pd
 from seeds import SEEDS
 
-from rl_core.arm import Arm
 from rl_core.claims import Claim, Criterion, Evidence, Finding
 from rl_core.dqn import DQNConfig, dqn
 from rl_core.epsilon import Decay
 from rl_core.evaluation import evaluate, of_values
-from rl_core.experiments import Results, run
+from rl_core.experiments import Arm, Results, run
 from rl_core.rollouts import weights_of
 from rl_core.shaping import Shaping
 from rl_core.statistics import (

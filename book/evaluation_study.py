@@ -18,11 +18,10 @@ from joblib import Parallel, delayed
 from scipy.stats import kendalltau
 from seeds import SEEDS
 
-from rl_core.arm import Arm
 from rl_core.claims import Claim, Criterion, Evidence, Finding
 from rl_core.discretise import binned
 from rl_core.evaluation import Agent, as_learned, evaluate, evaluate_table, greedy, of_values
-from rl_core.experiments import Results, run
+from rl_core.experiments import Arm, Results, run
 from rl_core.exploration import EpsilonGreedy, Evaluation, Linear
 from rl_core.fastest import Fastest, fastest
 from rl_core.grid_learning import GridConfig, q_learning_on_grid

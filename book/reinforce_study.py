@@ -14,9 +14,8 @@ import pandas as pd
 from figure_data import tidy
 from seeds import SEEDS
 
-from rl_core.arm import Arm
 from rl_core.claims import Claim, Criterion, Evidence, Finding
-from rl_core.experiments import Results, run
+from rl_core.experiments import Arm, Results, run
 from rl_core.reinforce import ReinforceConfig, reinforce
 from rl_core.statistics import (
     bootstrap_interval,

@@ -27,8 +27,8 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from rl_core import dynamics
-from rl_core.compiled import compiled
 from rl_core.episodes import make_environment
+from rl_core.kernels.compiled import compiled
 from rl_core.policies import is_integer, require
 
 MAX_CELLS = 2**31 - 1

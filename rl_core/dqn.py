@@ -46,8 +46,8 @@ from rl_core.policies import is_integer, is_number, is_one_of, require
 from rl_core.q_episodes import DIVERGED, SHAPED_NAN, Training, World, open_world
 from rl_core.q_update import Settings, make_learner
 from rl_core.replay import make_memory
-from rl_core.run import Failure, Run
 from rl_core.shaping import Shaping, compiled_shape
+from rl_core.training import Failure, Run
 
 PROGRESS_EVERY = 10
 """Episodes between two reports of progress."""

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 
 ACROBOT = 0
 MOUNTAIN_CAR = 1

@@ -15,7 +15,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from rl_core import dynamics, networks
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 from rl_core.policies import Policy, choose_action, draw_noise, is_integer, require
 
 EnvironmentLike = str | gymnasium.Env[Any, Any] | Callable[[], gymnasium.Env[Any, Any]]

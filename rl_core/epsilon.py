@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 from rl_core.policies import is_integer, is_number, require
 
 VALUE, START, END, STEPS, SHARE, AIM = range(6)

@@ -18,10 +18,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from rl_core import networks
-from rl_core.compiled import compiled
 from rl_core.discretise import Binned, start_binned, step_binned
 from rl_core.episodes import EnvironmentLike, Trajectory, check_fit, open_environment
 from rl_core.exploration import EPSILON_GREEDY, choose
+from rl_core.kernels.compiled import compiled
 from rl_core.policies import Policy, is_integer, require
 from rl_core.reinforce import ReinforceConfig
 from rl_core.rollouts import policy_of

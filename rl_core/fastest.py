@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rl_core import dynamics
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 from rl_core.mdp import MDP
 from rl_core.planning import value_iteration
 from rl_core.policies import is_integer, require

@@ -13,7 +13,7 @@ from rl_core import dynamics
 from rl_core.discretise import Binned, Discretised, binned
 from rl_core.policies import is_integer, require
 from rl_core.q_learning import QLearningConfig, q_learning
-from rl_core.run import Run
+from rl_core.training import Run
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 
 COURSE_LAYOUT = """\
 SWFWG

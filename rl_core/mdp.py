@@ -13,7 +13,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 from rl_core.toy_text import SUM_TOLERANCE, check_distribution, read_table, start_arrays
 
 

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 
 if TYPE_CHECKING:
     import torch

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rl_core import networks
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 
 
 def require(condition: bool, name: str, value: object, allowed: str) -> None:

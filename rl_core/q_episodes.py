@@ -20,8 +20,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from rl_core import dynamics
-from rl_core.compiled import compiled
 from rl_core.episodes import EnvironmentLike, GymnasiumEnvironment, make_environment
+from rl_core.kernels.compiled import compiled
 from rl_core.q_update import (
     DUE,
     NOT_A_NUMBER,

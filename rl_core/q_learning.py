@@ -29,7 +29,6 @@ from numba.extending import register_jitable
 from numpy.typing import ArrayLike, NDArray
 
 from rl_core import tabular
-from rl_core.compiled import compiled
 from rl_core.discretise import Binned
 from rl_core.exploration import (
     EPSILON_GREEDY,
@@ -45,9 +44,9 @@ from rl_core.exploration import (
     step_size,
     values,
 )
+from rl_core.kernels.compiled import compiled
 from rl_core.mdp import MDP
 from rl_core.planning import value_iteration
-from rl_core.run import Failure, Run
 from rl_core.tabular import Environment, Played, Streams, World, start, step
 from rl_core.tabular_record import (
     Appraisal,
@@ -61,6 +60,7 @@ from rl_core.tabular_record import (
     write_evaluation,
     write_loss,
 )
+from rl_core.training import Failure, Run
 
 NO_LIMIT = 2**62
 Q_STAR_TOLERANCE = 1e-10

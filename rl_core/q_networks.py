@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rl_core import dynamics, networks
-from rl_core.compiled import compiled
 from rl_core.episodes import EnvironmentLike
+from rl_core.kernels.compiled import compiled
 from rl_core.policies import is_integer, is_number, require
 from rl_core.q_episodes import CompiledWorld, GymnasiumWorld, open_world
 from rl_core.q_update import epsilon_greedy

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rl_core import epsilon, exploration, networks, replay
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 from rl_core.replay import Memory
 
 STEPS, UPDATES, COPIES, KEPT, ACTION = range(5)

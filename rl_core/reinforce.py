@@ -40,7 +40,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from rl_core import networks, policies
-from rl_core.compiled import compiled
 from rl_core.episodes import (
     Environment,
     EnvironmentLike,
@@ -50,6 +49,7 @@ from rl_core.episodes import (
     open_environment,
     spawn_streams,
 )
+from rl_core.kernels.compiled import compiled
 from rl_core.policies import (
     Categorical,
     Gaussian,
@@ -60,7 +60,7 @@ from rl_core.policies import (
     likelihood_gradient,
     require,
 )
-from rl_core.run import Failure, Run
+from rl_core.training import Failure, Run
 
 PROGRESS_EVERY = 10
 """Episodes between two reports of progress."""

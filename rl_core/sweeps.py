@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 from rl_core.mdp import MDP
 
 TIE = 1e-10

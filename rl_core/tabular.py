@@ -18,8 +18,8 @@ from gymnasium import spaces
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from rl_core.compiled import compiled
 from rl_core.discretise import Binned, start_binned, step_binned
+from rl_core.kernels.compiled import compiled
 from rl_core.mdp import MDP
 
 Environment = str | gym.Env[Any, Any] | Callable[[], gym.Env[Any, Any]]

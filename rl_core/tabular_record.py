@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 from rl_core.mdp import MDP
 from rl_core.plan import optimal_actions
 

@@ -20,7 +20,7 @@ from toy_learner import ToyConfig, learn
 import rl_core
 from rl_core import progress
 from rl_core.experiments import Arm, run
-from rl_core.progress import ArmProgress, Bars, Log, Reporter, watching
+from rl_core.experiments.progress import ArmProgress, Bars, Log, Reporter, watching
 
 TESTS = Path(__file__).parent
 
@@ -157,9 +157,9 @@ def test_bars_show_episodes_speed_and_time_left(monkeypatch):
 
 PROGRAM = """
 import sys
-import rl_core.progress
+import rl_core.experiments.progress
 import toy_experiment
-rl_core.progress.DRAW_SECONDS = 0.05
+rl_core.experiments.progress.DRAW_SECONDS = 0.05
 toy_experiment.main(*sys.argv[1:])
 """
 
@@ -194,8 +194,8 @@ def test_a_terminal_gets_bars(tmp_path):
 
 NOTEBOOK = """
 from pathlib import Path
-import rl_core.progress
-rl_core.progress.DRAW_SECONDS = 0.05
+import rl_core.experiments.progress
+rl_core.experiments.progress.DRAW_SECONDS = 0.05
 from rl_core.experiments import Arm, run
 from toy_learner import ToyConfig, learn
 arms = [Arm("a", learn, "toy", ToyConfig(seconds=0.02), 30)]

@@ -14,7 +14,7 @@ FILES = {
     "learner.py": """
         from lab import networks            # a module by `from package import`
         from .deep.inner import helper      # relative, into a subpackage
-        from rl_core.run import Run         # another followed package
+        from rl_core.training import Run         # another followed package
         import numpy as np                  # not followed
 
         def learn():
@@ -31,7 +31,7 @@ FILES = {
 }
 INVOLVED = {
     "lab", "lab.learner", "lab.networks", "lab.activations", "lab.lazy", "lab.deep",
-    "lab.deep.inner", "lab.constants", "rl_core", "rl_core.run",
+    "lab.deep.inner", "lab.constants", "rl_core", "rl_core.training",
 }  # fmt: skip
 
 
@@ -92,7 +92,7 @@ def test_a_module_without_package_brings_its_neighbours(lab):
 
 def test_figures_and_the_machinery_are_not_part_of_an_algorithm():
     involved = set(code(["rl_core.reinforce"]))
-    assert {"rl_core.reinforce", "rl_core.run", "rl_core.compiled"} <= involved
+    assert {"rl_core.reinforce", "rl_core.training", "rl_core.compiled"} <= involved
     machinery = {"figures", "experiments", "store", "workers", "progress", "statistics"}
     assert not involved & {f"rl_core.{name}" for name in machinery}
 

@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-import rl_core.store as store_module
-from rl_core.run import Failure
-from rl_core.store import ARRAYS, RECORD, TABLE, DamagedResultError, Store
+import rl_core.experiments.store as store_module
+from rl_core.experiments.store import ARRAYS, RECORD, TABLE, DamagedResultError, Store
+from rl_core.training import Failure
 
 DIGEST = "0f" * 32
 FILES = [TABLE, ARRAYS, RECORD]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from rl_core.run import Failure, Run
+from rl_core.training import Failure, Run
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,1 @@
+"""Arithmetic that is compiled. It knows nothing of algorithms, worlds and experiments."""

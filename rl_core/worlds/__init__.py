@@ -1,0 +1,1 @@
+"""Worlds to learn in: how they are named, opened and told apart."""
