@@ -15,7 +15,7 @@ from tqdm import tqdm
 
 DRAW_SECONDS = 0.5
 LOG_SECONDS = 30.0
-FORMAT = "{desc}{percentage:3.0f}% of {total_fmt} seeds, {postfix}{remaining} left"
+FORMAT = "{desc}{percentage:3.0f}% of {total_fmt} seeds{postfix}, {remaining} left"
 
 
 class Progress:
