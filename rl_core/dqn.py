@@ -41,10 +41,10 @@ from rl_core.checks import (
     require,
     truth,
 )
-from rl_core.compiled import compiled
 from rl_core.exploration import Epsilon, HalfWay, check_epsilon, schedule_state
 from rl_core.kernels import networks, q_update
 from rl_core.kernels.choices import VALUE, after_copy, after_goal, after_step, greedy_action
+from rl_core.kernels.compiled import compiled
 from rl_core.kernels.q_update import ACTION, COPIES, KEPT, STEPS, UPDATES, Learner, Settings
 from rl_core.kernels.replay import Memory, make_memory, sample, store
 from rl_core.policies import MLP, Network, check_network

@@ -14,8 +14,8 @@ import torch
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from rl_core.compiled import compiled
 from rl_core.kernels import likelihood
+from rl_core.kernels.compiled import compiled
 from rl_core.kernels.likelihood import Actor, Policy
 from rl_core.worlds.environments import TaskWorld, World, step
 

@@ -21,10 +21,10 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from rl_core.checks import floats, generator, instance, integer, number, require
-from rl_core.compiled import compiled
 from rl_core.episodes import Trajectory, play_episode
 from rl_core.kernels import likelihood, networks
 from rl_core.kernels.choices import EPSILON_GREEDY, choose
+from rl_core.kernels.compiled import compiled
 from rl_core.kernels.likelihood import Policy
 from rl_core.policies import Gaussian
 from rl_core.reinforce import ReinforceConfig

@@ -43,10 +43,17 @@ def imported(name: str, path: object) -> Any:
 def code_behind(path: str) -> str:
     """Return the SHA-256 of the module at an import path and of what it imports.
 
+    What is installed is named by its version instead.
+
     Examples
     --------
     >>> len(code_behind("rl_core.maze:Maze"))
     64
     """
-    found = repr(sorted(sources.code([path.partition(":")[0]]).items()))
+    module = path.partition(":")[0]
+    if sources.is_project(module):
+        found = repr(sorted(sources.code([module]).items()))
+    else:
+        top = importlib.import_module(module.partition(".")[0])
+        found = f"{module} {getattr(top, '__version__', '')}"
     return hashlib.sha256(found.encode()).hexdigest()

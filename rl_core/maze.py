@@ -17,7 +17,7 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from rl_core import checks
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 from rl_core.mdp import MDP, OwnModel
 from rl_core.worlds.maze_layout import COURSE_LAYOUT, MAX_FLAGS, find, random_layout, read_layout
 from rl_core.worlds.maze_picture import draw_maze

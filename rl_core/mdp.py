@@ -15,8 +15,8 @@ from gymnasium import wrappers
 from numpy.typing import ArrayLike, NDArray
 
 from rl_core import checks
-from rl_core.compiled import compiled
 from rl_core.kernels.bounds import SUM_TOLERANCE
+from rl_core.kernels.compiled import compiled
 from rl_core.worlds.tables import read_table, start_arrays
 
 TRANSPARENT = (

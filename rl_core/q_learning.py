@@ -43,7 +43,6 @@ from rl_core.checks import (
     optional,
     require,
 )
-from rl_core.compiled import compiled
 from rl_core.exploration import (
     EpsilonGreedy,
     ExplorationRule,
@@ -67,6 +66,7 @@ from rl_core.kernels.appraisal import (
     write_loss,
 )
 from rl_core.kernels.choices import EPSILON_GREEDY, choose, step_size
+from rl_core.kernels.compiled import compiled
 from rl_core.mdp import MDP
 from rl_core.planning import optimal_actions, value_iteration
 from rl_core.training import Failure, Progress, Run

@@ -34,9 +34,9 @@ from numpy.typing import NDArray
 
 from rl_core import modules
 from rl_core.checks import fields, instance, integer, number, one_of, optional, positive, truth
-from rl_core.compiled import compiled
 from rl_core.episodes import ModuleActor, Trajectory, play_episode, with_constant
 from rl_core.kernels import likelihood
+from rl_core.kernels.compiled import compiled
 from rl_core.kernels.likelihood import Actor, Policy
 from rl_core.policies import (
     MLP,

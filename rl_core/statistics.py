@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 
 Statistic = Callable[..., Any]
 POINTS_AT_ONCE = 64  # bounds the memory of a bootstrap to 5 MB for 10,000 resamples

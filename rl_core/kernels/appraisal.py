@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 
 TOLERANCE = 1e-12
 """How far values may still move in a sweep when a policy counts as evaluated."""

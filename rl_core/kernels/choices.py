@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 
 EPSILON_GREEDY, SOFTMAX, UNNORMALISED_SOFTMAX = range(3)
 """The rules' numbers, by which `choose` knows them."""

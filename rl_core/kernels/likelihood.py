@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rl_core.compiled import compiled
 from rl_core.kernels import networks
+from rl_core.kernels.compiled import compiled
 
 
 class Policy(NamedTuple):

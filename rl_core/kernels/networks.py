@@ -21,7 +21,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 
 LANES = 32
 """Batches are computed in multiples of this many samples; `padded` says how many."""

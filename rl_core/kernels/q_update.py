@@ -24,8 +24,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rl_core.compiled import compiled
 from rl_core.kernels import choices, networks
+from rl_core.kernels.compiled import compiled
 from rl_core.kernels.replay import Memory
 
 STEPS, UPDATES, COPIES, KEPT, ACTION = range(5)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 
 TIE = 1e-10
 """Actions whose values differ by less than this fraction of the state's largest |Q| are tied: it is

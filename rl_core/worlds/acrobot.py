@@ -7,7 +7,7 @@ from gymnasium import spaces
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 from rl_core.worlds.tasks import Action, Observation, State, clip, task
 
 # Two links of mass 1 and length 1, centres of mass at 0.5, moments of inertia 1, g = 9.8.

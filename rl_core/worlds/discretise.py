@@ -27,7 +27,7 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from rl_core.checks import floats, instance, integer, integers, require
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 from rl_core.worlds.environments import EnvironmentLike, opened
 from rl_core.worlds.names import find
 from rl_core.worlds.tasks import Kernel, Task

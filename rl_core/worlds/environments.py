@@ -20,7 +20,7 @@ from gymnasium import spaces
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 from rl_core.worlds.names import Make, find, make_environment
 from rl_core.worlds.tasks import Kernel, Task
 from rl_core.worlds.twins import twin

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from rl_core import checks
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 
 COURSE_LAYOUT = """\
 SWFWG

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from gymnasium import spaces
 
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 from rl_core.worlds.mountain_car import MAX_POSITION, MAX_SPEED, MIN_POSITION, OBSERVATIONS, SLOPE
 from rl_core.worlds.tasks import Action, Observation, State, clip, task
 

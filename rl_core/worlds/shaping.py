@@ -18,8 +18,8 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from rl_core.compiled import compiled
 from rl_core.imports import code_behind, imported
+from rl_core.kernels.compiled import compiled
 
 ORIGINAL = "rl_core.worlds.shaping:original"
 """The environment's own reward."""

@@ -19,7 +19,7 @@ from gymnasium import spaces
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 from rl_core.mdp import MDP
 from rl_core.worlds.discretise import GriddedTask, start_gridded, step_gridded
 from rl_core.worlds.environments import EnvironmentLike, checked_reward, opened

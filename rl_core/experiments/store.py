@@ -5,7 +5,7 @@ A result is one seed of one arm, in a folder of its own, named by its digest:
     results/<digest>/table.parquet    the tidy table
     results/<digest>/arrays.parquet   what was learned: one row, one column an array, flattened
     results/<digest>/record.json      failures, provenance, and the checksum of every file
-    scratch/                          folders being written; leftovers of killed runs
+    scratch/                          folders being written, each locked by its writer
 
 A result appears whole or not at all: its folder is written in `scratch`, flushed to the disk, and
 then renamed. Every byte is under a checksum, so damage is found when a result is read. Several
@@ -14,12 +14,13 @@ processes may use one store at once.
 
 import contextlib
 import hashlib
+import importlib
 import json
 import os
 import shutil
 import time
 import uuid
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -30,10 +31,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from rl_core.run import Failure
+from rl_core.training import Failure
+
+_fcntl: Any = importlib.import_module("fcntl") if os.name == "posix" else None
 
 TABLE, ARRAYS, RECORD = "table.parquet", "arrays.parquet", "record.json"
-STALE_SECONDS = 600.0
+STALE_SECONDS = 600.0  # of what cannot be locked
 
 
 class DamagedResultError(Exception):
@@ -114,11 +117,11 @@ class Store:
             "failures": [asdict(failure) for failure in failures],
             "provenance": dict(provenance),
         }
-        folder = self.scratch()
-        for name, data in {**files, RECORD: _sealed(record)}.items():
-            _write_flushed(folder / name, data)
-        _flush(folder)
-        self._place(folder, digest)
+        with scratch(self.path / "scratch") as folder:
+            for name, data in {**files, RECORD: _sealed(record)}.items():
+                _write_flushed(folder / name, data)
+            _flush(folder)
+            self._place(folder, digest)
 
     def read(self, digest: str) -> Stored | None:
         """Return the result under `digest`, all of its files verified, or None if there is none.
@@ -169,20 +172,9 @@ class Store:
             found.append(record["provenance"])
         return found
 
-    def scratch(self) -> Path:
-        """Return a new empty folder for files that are not results yet."""
-        folder = self.path / "scratch" / uuid.uuid4().hex
-        folder.mkdir(parents=True)
-        return folder
-
     def clean(self) -> None:
-        """Remove what killed runs left in `scratch`: all that nobody touched for ten minutes."""
-        for folder in (self.path / "scratch").glob("*"):
-            try:
-                if time.time() - folder.stat().st_mtime > STALE_SECONDS:
-                    shutil.rmtree(folder, ignore_errors=True)
-            except FileNotFoundError:  # another process was quicker
-                continue
+        """Remove what killed writers left behind."""
+        sweep(self.path / "scratch", "*")
 
     def _verified(self, digest: str) -> tuple[dict[str, Any], dict[str, bytes]] | None:
         """Return the record and the Parquet files of a result, each checked against its checksum.
@@ -217,7 +209,6 @@ class Store:
                     raise
             try:
                 if self._verified(digest) is not None:
-                    shutil.rmtree(folder)
                     return
             except DamagedResultError:
                 self._discard(target)
@@ -225,10 +216,65 @@ class Store:
 
     def _discard(self, target: Path) -> None:
         """Move a damaged result out of the way at once, then remove its files."""
-        away = self.scratch()
+        with scratch(self.path / "scratch") as away, contextlib.suppress(FileNotFoundError):
+            os.rename(target, away / "damaged")  # unless another process was quicker
+
+
+@contextlib.contextmanager
+def scratch(parent: Path, prefix: str = "") -> Iterator[Path]:
+    """Make an empty folder, locked until the block ends; then remove it, unless it was renamed.
+
+    The lock goes with the process, however that ends, so that `sweep` can tell the dead.
+    """
+    parent.mkdir(parents=True, exist_ok=True)
+    lock = None
+    while lock is None:  # a sweep may take a folder that is not locked yet
+        folder = parent / f"{prefix}{uuid.uuid4().hex}"
+        folder.mkdir()
+        lock = _locked(folder)
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        if lock >= 0:
+            os.close(lock)
+
+
+def sweep(parent: Path, pattern: str) -> None:
+    """Remove the folders of that kind whose makers are dead."""
+    for folder in parent.glob(pattern):
+        lock = _locked(folder)
+        if lock is None:
+            continue
         with contextlib.suppress(FileNotFoundError):  # another process was quicker
-            os.rename(target, away / "damaged")
-        shutil.rmtree(away)
+            if lock >= 0 or time.time() - folder.stat().st_mtime > STALE_SECONDS:
+                shutil.rmtree(folder, ignore_errors=True)
+        if lock >= 0:
+            os.close(lock)
+
+
+def _locked(folder: Path) -> int | None:
+    """Return the handle of the lock on a folder, None if another has it or the folder is gone.
+
+    -1 where there are no such locks (Windows, some network drives): there, age has to tell.
+    """
+    if _fcntl is None:
+        return -1
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except FileNotFoundError:
+        return None
+    except OSError:
+        return -1
+    try:
+        _fcntl.flock(handle, _fcntl.LOCK_EX | _fcntl.LOCK_NB)
+    except OSError as error:
+        os.close(handle)
+        return None if isinstance(error, BlockingIOError) else -1
+    if folder.exists():
+        return handle
+    os.close(handle)
+    return None
 
 
 def _flattened(arrays: Mapping[str, NDArray[Any]]) -> pa.Table:
