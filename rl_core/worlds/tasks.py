@@ -22,14 +22,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from types import FunctionType as PlainFunction
+from types import FunctionType, SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
 from numba.core import types
 from numba.core.registry import CPUDispatcher
-from numba.core.types import FunctionType, boolean, float32, float64, void
+from numba.core.types import boolean, float32, float64, void
 from numba.core.types.npytypes import NumPyRandomGeneratorType
 from numpy.typing import NDArray
 
@@ -247,7 +247,7 @@ def clip(value: float, low: float, high: float) -> float:
 
 def _check_function(name: str, function: object) -> None:
     allowed = f"a plain function of {_ARGUMENTS[name]}"
-    arguments = inspect.signature(instance(name, function, PlainFunction, allowed)).parameters
+    arguments = inspect.signature(instance(name, function, FunctionType, allowed)).parameters
     wanted = len(_SIGNATURES[name].args)
     require(len(arguments) == wanted, name, f"({', '.join(arguments)})", allowed)
 
@@ -258,9 +258,21 @@ class _FirstClass(CPUDispatcher):
     `numba.cfunc` makes such functions too, but an exception in one of those is printed and lost.
     """
 
-    @property
-    def _numba_type_(self) -> Any:
-        return FunctionType(self.nopython_signatures[0])
+    _numba_type_: Any = None
+
+    def compile_only(self, signature: Any) -> None:
+        """Compile for the one signature that there will be."""
+        self.compile(signature)
+        self.disable_compile()
+        # Numba asks anew at every call of a loop: keep what takes long to find.
+        result: Any = next(iter(self.overloads.values()))
+        address = cache(result.library.get_pointer_to_function)
+        self._result = result._replace(library=SimpleNamespace(get_pointer_to_function=address))
+        self._numba_type_ = types.FunctionType(signature)
+
+    def get_compile_result(self, signature: Any) -> Any:
+        """Return where the machine code is."""
+        return self._result
 
 
 @cache
@@ -273,7 +285,7 @@ def _first_class(name: str, function: Callable[..., Any]) -> Any:
         kept: Any = compiled(function)
         made._cache = kept._cache
     try:
-        made.compile(signature)
+        made.compile_only(signature)
     except Exception as error:  # numba has many
         told = re.sub(r"^Failed in .*?\) ", "", " ".join(str(error).split()))
         reason = re.split(r" (?:During:|File|There are) ", told)[0]
@@ -281,5 +293,4 @@ def _first_class(name: str, function: Callable[..., Any]) -> Any:
             f"{name} must be a function of {_ARGUMENTS[name]} that numba compiles, "
             f"got {function.__module__}.{function.__qualname__}: {reason}"
         ) from error
-    made.disable_compile()
     return made
