@@ -12,10 +12,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 # Where things are, what the machine can do, and what the project itself reads:
-KEPT = """
-    PATH HOME USER LOGNAME SHELL TERM COLUMNS TMPDIR CI SEEDS CHROMIUM SYSTEMROOT LD_LIBRARY_PATH
-    NUMBA_CACHE_DIR DISPLAY WAYLAND_DISPLAY XAUTHORITY XDG_RUNTIME_DIR BROWSER
-    """.split()
+KEPT = {
+    *("PATH", "HOME", "USER", "LOGNAME", "SHELL", "TERM", "COLUMNS", "TMPDIR", "SYSTEMROOT"),
+    *("LD_LIBRARY_PATH", "NUMBA_CACHE_DIR", "SEEDS", "CI", "CHROMIUM"),
+    *("DISPLAY", "WAYLAND_DISPLAY", "XAUTHORITY", "XDG_RUNTIME_DIR", "BROWSER"),
+}
 OURS = ("RL_CORE_", "DASK_")
 """How the names begin that are the project's own, or of the workers a user chooses."""
 
