@@ -15,10 +15,10 @@ from typing import Any
 import sphinx_thebe
 from docutils import nodes
 from PIL import Image
-from report.seeds import FULL, PREVIEW, SEEDS
 from sphinx.application import Sphinx
 from sphinx.config import Config
 
+from report.seeds import FULL, PREVIEW, SEEDS
 from web import icons
 
 BANNER = (
