@@ -17,6 +17,8 @@ sys.path[:0] = [str(ROOT), str(ROOT / "book")]  # for the program; pytest has th
 
 from chromium import NoBrowserError, open_browser  # noqa: E402
 from interactive import (  # noqa: E402
+    learning_log,
+    learning_widget,
     maze_sweeps,
     maze_widget,
     scripts,
@@ -24,8 +26,11 @@ from interactive import (  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from playwright.sync_api import Browser, Page  # noqa: E402
 
+from rl_core.exploration import EpsilonGreedy  # noqa: E402
 from rl_core.maze import Maze  # noqa: E402
 from rl_core.maze_figures import situation_figure  # noqa: E402
+from rl_core.planning import value_iteration  # noqa: E402
+from rl_core.q_learning import QLearningConfig  # noqa: E402
 
 
 def page_of(*sections: tuple[str, object]) -> str:
@@ -47,6 +52,9 @@ def page_of(*sections: tuple[str, object]) -> str:
 
 MAZE = Maze()
 SWEEPS = maze_sweeps(MAZE)
+Q_STAR = value_iteration(MAZE.model(), gamma=0.9, tolerance=1e-10, progress=False).Q
+CONFIG = QLearningConfig(step_size=0.2, exploration=EpsilonGreedy(0.9))
+LOG = learning_log(MAZE, CONFIG, Q_STAR)
 
 
 def demonstration() -> str:
@@ -54,6 +62,7 @@ def demonstration() -> str:
     still = situation_figure(MAZE, SWEEPS.V[-1][:, None].repeat(4, axis=1), "")
     return page_of(
         ("One sweep at a time", maze_widget(MAZE, SWEEPS, still=still)),
+        ("One step at a time", learning_widget(MAZE, LOG, Q_STAR, still=still)),
     )
 
 

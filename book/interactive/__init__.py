@@ -27,7 +27,7 @@ picture is what print, JupyterLab and browsers without scripts show. A page need
 
 #from interactive.curves import knob, seed_curves
 #from interactive.grids import snapshots
-#from interactive.learning import LearningLog, learning_log, learning_widget
+from interactive.learning import LearningLog, learning_log, learning_widget
 from interactive.maze import Sweeps, maze_sweeps, maze_widget
 from interactive.page import Widget, scripts
 
