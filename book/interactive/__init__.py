@@ -1,4 +1,4 @@
-"""Figures that answer: what was computed, as a snippet of HTML that the scripts of the book bring to life.
+"""Figures that answer: data as a snippet of HTML that the scripts of the book bring to life.
 
 Each function returns a `Widget`, which a notebook shows when it is the last line of a cell. In it
 stand the data as JSON and a still picture; `_static/play/*.js` draws the rest from the data. The
@@ -25,8 +25,8 @@ picture is what print, JupyterLab and browsers without scripts show. A page need
               x_label="position", y_label="velocity", value_label="mean action")
 """
 
-#from interactive.curves import knob, seed_curves
-#from interactive.grids import snapshots
+from interactive.curves import knob, seed_curves
+from interactive.grids import snapshots
 from interactive.learning import LearningLog, learning_log, learning_widget
 from interactive.maze import Sweeps, maze_sweeps, maze_widget
 from interactive.page import Widget, scripts

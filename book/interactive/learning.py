@@ -213,9 +213,10 @@ def learning_widget(maze: Maze, log: LearningLog, Q_star: ArrayLike, *, still: A
         "lengths": log.lengths,
         "snapshots": [{"episode": k, "Q": doubles(Q)} for k, Q in log.snapshots.items()],
         "Q_star": doubles(best),
-        "curve": {"episode": [0, *shown], "error": significant(
-            [np.linalg.norm(best), *log.errors[shown - 1]], 6
-        )},
+        "curve": {
+            "episode": [0, *shown],
+            "error": significant([np.linalg.norm(best), *log.errors[shown - 1]], 6),
+        },
     }
     label = f"Q-learning in the Maze, step by step: seed {log.seed}."
     return Widget("learning", data, label, still)

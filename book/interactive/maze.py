@@ -1,6 +1,7 @@
-"""Chapter 1: planning on the Maze, one sweep of Q-value iteration or round of policy iteration at a time."""
+"""Chapter 1: planning on the Maze, one sweep or round at a time."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -84,7 +85,7 @@ def maze_sweeps(maze: Maze, gamma: float = 0.9, threshold: float = 1e-5) -> Swee
     for _ in range(len(rounds.table)):
         values.append(policy_evaluation(mdp, policies[-1], gamma=gamma))
         policies.append(_improved(backup(mdp, values[-1], gamma=gamma), policies[-1]))
-    changes = [int((new != old).sum()) for old, new in zip(policies, policies[1:], strict=False)]
+    changes = [int((new != old).sum()) for old, new in pairwise(policies)]
     _same(changes == rounds.table["policy_changes"].tolist(), "the rounds of policy iteration")
     Q = np.array(tables)
     best = np.array([optimal_actions(table) for table in tables])

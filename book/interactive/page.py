@@ -1,4 +1,4 @@
-"""What all interactive figures are made of: data as JSON, a still picture, and what it is called."""
+"""What all interactive figures are made of: data as JSON, a still picture, and a name."""
 
 import base64
 import html
