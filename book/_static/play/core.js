@@ -160,7 +160,7 @@ window.play = (() => {
       if (!build) continue;
       const live = el("div", { class: "play-live" });
       host.append(live);
-      build(live, JSON.parse(host.querySelector("script").textContent), host);
+      build(live, JSON.parse(host.querySelector(":scope > script").textContent), host);
       host.classList.add("play-on");
     }
   });

@@ -1,7 +1,8 @@
 // Learning curves: every seed of an arm (chapters 3 to 5), and the arms of one knob (2 and 5).
 (() => {
   const { el, svg, brief, grouped, slider, rove, chart, path, band } = play;
-  const MARKS = { line: ["", "5 3", "2 3", "8 3 2 3"], colour: ["var(--blue)", "var(--vermillion)", "var(--purple)", "var(--orange)"] };
+  const MARKS = { line: ["", "5 3", "2 3", "8 3 2 3"], key: ["solid", "dashed", "dotted", "double"], colour: ["var(--blue)", "var(--vermillion)", "var(--purple)", "var(--orange)"] };
+  const exact = (y) => String(y).replace("-", "−");
   const finite = (ys) => ys.filter((y) => y != null);
   const range = (ys, log) => {
     const [low, high] = [Math.min(...ys), Math.max(...ys)];
@@ -101,7 +102,7 @@
       plot.draw();
     }
     const key = fates.map((fate, i) => {
-      const colour = `--colour: ${MARKS.colour[i % 4]}`;
+      const colour = `--colour: ${MARKS.colour[i % 4]}; --dash: ${MARKS.key[i % 4]}`;
       return el("span", { class: "key line", style: colour }, `${fate} (${data.seeds.filter((it) => it.fate === fate).length})`);
     });
     key.push(el("span", { class: "key line strong", style: "--colour: var(--ink)" }, "median of all"));
@@ -145,11 +146,10 @@
           measure.values.forEach((y, i) => y != null && layer.append(svg("circle", { class: i === at ? "cursor" : "dot", cx: X(data.values[i]), cy: Y(y), r: i === at ? 6 : 3.5 })));
         });
       return { element: el("div", {}, el("p", { class: "play-said" }, `${measure.name}: `, value), small.host), show: () => {
-        value.textContent = measure.values[at] == null ? "–" : brief4(measure.values[at]);
+        value.textContent = measure.values[at] == null ? "–" : exact(measure.values[at]);
         small.draw();
       } };
     });
-    const brief4 = (v) => String(v).replace("-", "−");
     const said = el("p", { class: "play-hidden", "aria-live": "polite" });
     const bar = slider(data.name, data.values.length - 1, (i) => `${data.name} = ${data.values[i]}`, (i) => { at = i; render(); });
     function render() {
