@@ -138,15 +138,16 @@ def reproducible(seed: int = 0) -> Iterator[None]:
     What a module draws when it is called (dropout) comes from torch's own generator, which begins
     with `seed`.
     """
-    threads, deterministic = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
+    threads, mode = torch.get_num_threads(), torch.get_deterministic_debug_mode()
     torch.set_num_threads(1)
-    torch.use_deterministic_algorithms(True)
+    # Unlike `use_deterministic_algorithms` it does not import torch's compiler, for seconds.
+    torch.set_deterministic_debug_mode("error")
     try:
         with _seeded(seed):
             yield
     finally:
         torch.set_num_threads(threads)
-        torch.use_deterministic_algorithms(deterministic)
+        torch.set_deterministic_debug_mode(mode)
 
 
 def as_arrays(module: torch.nn.Module) -> dict[str, NDArray[Any]]:

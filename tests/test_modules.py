@@ -166,7 +166,7 @@ def test_what_has_no_gradient_stays(kind):
 def test_global_random_states_and_settings_are_put_back():
     def states():
         numpys = str(np.random.get_state())  # noqa: NPY002
-        threads = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
+        threads = torch.get_num_threads(), torch.get_deterministic_debug_mode()
         return torch.get_rng_state().tolist(), numpys, random.getstate(), threads
 
     before = states()
