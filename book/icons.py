@@ -15,6 +15,7 @@ logging.getLogger("fontTools").setLevel(logging.WARNING)  # it tells all that it
 RULES = """\
 @font-face {{ font-family: "Font Awesome 6 Free"; font-weight: 900; font-display: block;
   src: url(data:font/woff;base64,{font}) format("woff"); }}
+:root {{ --fa-font-solid: normal 900 1em/1 "Font Awesome 6 Free"; }}
 .fa, .fas, .fa-solid {{ display: inline-block; font-family: "Font Awesome 6 Free";
   font-style: normal; font-weight: 900; line-height: 1; text-rendering: auto; }}
 .fa-lg {{ font-size: 1.25em; line-height: 0.05em; vertical-align: -0.075em; }}
