@@ -21,8 +21,8 @@ LEFT_OUT = ("api",)
 STYLE = """
     html { font-size: 12px !important; }
     body { background: white; }
-    button:not(th button), .headerlink, details.hide, .sorts, .toctree-wrapper, .tableofcontents-wrapper,
-    .admonition-title::after { display: none !important; }
+    button:not(th button), .headerlink, details.hide, .sorts, .toctree-wrapper,
+    .tableofcontents-wrapper, .admonition-title::after { display: none !important; }
     article { max-width: 100% !important; padding: 0 !important; }
     article { break-before: page; }
     article h1 { margin-top: 0; }
@@ -130,7 +130,7 @@ def contents(articles: list[Tag], numbers: dict[str, int]) -> Iterator[str]:
                 link.decompose()
             kind = "title" if heading.name == "h1" else "section"
             number = numbers.get(section["id"], "")
-            title = f"{heading.decode_contents()} <span class="page">{number}</span>"
+            title = f"{heading.decode_contents()} <span class='page'>{number}</span>"
             yield f'<li class="{kind}"><a href="#{section["id"]}">{title}</a></li>'
 
 
