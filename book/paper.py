@@ -27,7 +27,7 @@ STYLE = """
     article { break-before: page; }
     article h1 { margin-top: 0; }
     .printed-contents ol { columns: 2; column-gap: 3em; list-style: none; padding: 0; }
-    .printed-contents a { display: flex; color: inherit; text-decoration: none; }
+    .printed-contents a { display: flex; gap: 0.3em; color: inherit; text-decoration: none; }
     .printed-contents a::before { content: ""; order: 1; flex: 1; margin: 0 0.5em;
       border-bottom: 1px dotted; }
     .printed-contents .page { order: 2; }

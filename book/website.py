@@ -124,6 +124,10 @@ def lightened(text: str, page: Path) -> str:
     )
     body = re.sub(r"<img((?:\s[^>]*)?>)", lambda tag: sized(tag, page), body)
     body = re.sub(r"<th(?:\s[^>]*)?>(?:\s|&nbsp;)*</th>", "<td></td>", body)
+    # Read out is what can be read, not another name for it.
+    body = re.sub(
+        r'(<summary|<button[^>]*search-button-field[^>]*) aria-label="[^"]*"', r"\1", body
+    )
     return head + "</head>" + body
 
 
