@@ -70,7 +70,7 @@ CALLS: list[tuple[Callable, dict]] = [
     (planning.optimal_actions, {"Q": np.zeros((3, 2)), "tolerance": 0.1}),
     (mdp.MDP.from_env, {"env": "FrozenLake-v1", "start_distribution": np.eye(16)[0]}),
     (Maze, {"slip": 0.1}),
-    (random_maze, {"rows": 4, "columns": 4, "flags": 1, "rng": rng()}),
+    (random_maze, {"rows": 4, "columns": 4, "flags": 1, "wall_fraction": 0.1, "rng": rng()}),
     (policies.MLP, {"hidden": (3,), "biases": True}),
     (policies.Module, {"function": "torch.nn:Linear"}),
     (policies.Gaussian, {field.name: getattr(Gaussian(), field.name) for field in fields(Gaussian)}),
@@ -161,8 +161,7 @@ def outcome(function: Callable, arguments: dict, name: str) -> str:
     return "taken"
 
 
-# Where these are bad, an argument they belong to is named instead.
-ALSO = {"position", "observations", "V"}
+WORK = {"episodes", "max_steps", "resamples", "rows", "columns"}
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -172,6 +171,8 @@ def test_every_odd_argument_is_taken_or_refused_by_name(tmp_path, monkeypatch):
     for function, valid in CALLS:
         for name in valid:
             for odd in ODD:
+                if name in WORK and isinstance(odd, int) and 2**31 <= odd < 2**63:
+                    continue  # allowed, and a long day's work
                 found = outcome(function, {**valid, name: odd}, name)
                 tried += 1
                 told = f"{function.__qualname__}({name}={odd!r}): {found}"
