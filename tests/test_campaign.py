@@ -27,7 +27,7 @@ from rl_core.reinforce import ReinforceConfig, reinforce
 from rl_core.worlds import discretise, environments, names, tasks
 from rl_core.worlds.shaping import Shaping
 
-SECONDS = 5  # a call that takes longer hangs
+SECONDS = 20  # a call that takes longer hangs; some compile
 NAMELESS = 0.01  # share of refusals that need not name the argument
 
 ODD = [
@@ -38,7 +38,7 @@ ODD = [
     *((), (1,), (0, 0), [], [1, 2], [[1], [1, 2]], {}, {"a": 1}, {1}, range(0), range(3), iter([0])),
     *(np.array([]), np.array(3), np.zeros(2), np.zeros((2, 2)), np.array(["x"]), np.array([None])),
     *(np.full(3, np.nan), np.array([np.inf, -np.inf]), pd.DataFrame(), pd.Series([1.0, 2.0])),
-    *(object(), int, len, lambda: None, MLP(), np.random.default_rng(0), spaces.Discrete(2)),
+    *(object(), int, len, MLP(), np.random.default_rng(0), spaces.Discrete(2)),
 ]
 
 
@@ -173,6 +173,8 @@ def test_every_odd_argument_is_taken_or_refused_by_name(tmp_path, monkeypatch):
             for odd in ODD:
                 if name in WORK and isinstance(odd, int) and 2**31 <= odd < 2**63:
                     continue  # allowed, and a long day's work
+                if name == "progress" and callable(odd):
+                    continue  # allowed; what it raises is its own
                 found = outcome(function, {**valid, name: odd}, name)
                 tried += 1
                 told = f"{function.__qualname__}({name}={odd!r}): {found}"
