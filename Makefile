@@ -93,7 +93,7 @@ notebooks: setup ## every notebook at full scale (nbmake)
 	$(RUN) pytest --nbmake --nbmake-timeout=5400 -o faulthandler_timeout=0 --durations=0 $(NOTEBOOKS)
 
 browser: book ## the built book: claims, links; in a headless Chromium pictures, mathematics, films, search
-	$(RUN) pytest tests/built_book.py tests/browser.py
+	$(RUN) pytest tests/built_book.py tests/browser.py tests/interactive_browser.py
 
 hostile: setup ## a small book built among hostile settings has the same pictures and claims
 	$(RUN) pytest tests/hostile.py
