@@ -15,13 +15,14 @@ from torch import nn
 
 from bench.table import comparison
 from rl_core.dqn import DQNConfig, dqn
+from rl_core.policies import MLP
 
 SEEDS = range(30)
 STARTS = 1_000  # steps before the first update
 STEPS = 2_000  # measured steps, each with an update
 ROUNDS = 3
 CONFIG = DQNConfig(
-    biases=True,
+    network=MLP(),
     optimiser="adam",
     memory_size=3_000,
     learning_starts=STARTS,
@@ -57,7 +58,7 @@ def stable_baselines(name: str, seed: int) -> float:
         target_update_interval=CONFIG.copy_every,
         exploration_fraction=1e-6,
         exploration_final_eps=CONFIG.epsilon,
-        policy_kwargs={"net_arch": list(CONFIG.hidden), "activation_fn": nn.ReLU},
+        policy_kwargs={"net_arch": list(CONFIG.network.hidden), "activation_fn": nn.ReLU},
         device="cpu",
         seed=seed,
     )

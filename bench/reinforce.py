@@ -23,9 +23,9 @@ from torch.distributions import Categorical as TorchCategorical
 from torch.distributions import Normal
 
 from bench.table import comparison
-from rl_core import networks, policies, reinforce
-from rl_core.episodes import CompiledEnvironment
-from rl_core.policies import Gaussian, make_policy
+from rl_core import reinforce
+from rl_core.kernels import likelihood, networks
+from rl_core.policies import MLP, Categorical, Gaussian, initial_parameters, make_policy
 from rl_core.reinforce import ReinforceConfig
 
 SEEDS = range(30)
@@ -38,7 +38,7 @@ CONFIGS = {
     "MountainCar-v0": ReinforceConfig(max_episode_steps=100_000, learn_from_capped=False),
     "MountainCarContinuous-v0": ReinforceConfig(
         policy=Gaussian(mean="weights", sigma=0.5),
-        biases=False,
+        network=MLP(biases=False),
         learning_rate=2e-3,
         epochs=1,
         normalise="centre",
@@ -59,10 +59,10 @@ class UsualAgent:
         self.gaussian = isinstance(config.policy, Gaussian)
         n_in = self.env.observation_space.shape[0]
         n_out = n_in if self.gaussian else self.env.action_space.n
-        widths = (n_in, *config.hidden, n_out)
+        widths = (n_in, *config.network.hidden, n_out)
         layers = []
         for a, b in pairwise(widths):
-            layers += [nn.Linear(a, b, bias=config.biases), nn.ReLU()]
+            layers += [nn.Linear(a, b, bias=config.network.biases), nn.ReLU()]
         self.network = nn.Sequential(*layers[:-1])
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=config.learning_rate)
 
@@ -176,12 +176,12 @@ def where_time_goes(name: str) -> str:
 
         return call
 
-    play = timed("episodes", CompiledEnvironment.play)
-    learner = timed("learner", reinforce._learn)
+    play = timed("episodes", reinforce.play_episode)
+    learner = timed("learner", likelihood.learn)
     start = time.perf_counter()
     with (
-        mock.patch.object(CompiledEnvironment, "play", lambda *a: play(*a)),
-        mock.patch.object(reinforce, "_learn", learner),
+        mock.patch.object(reinforce, "play_episode", play),
+        mock.patch.object(likelihood, "learn", learner),
     ):
         steps = ours(name, episodes=WHOLE, budget=BUDGET)
     seconds = time.perf_counter() - start
@@ -219,10 +219,8 @@ def stacked_update(n_networks: int, n: int) -> Callable[[], int]:
 def compiled_update(n_networks: int, n: int) -> Callable[[], int]:
     """The same with the compiled networks, one after the other."""
     rng = np.random.default_rng(0)
-    policy = make_policy(policies.Categorical(), (10, 20), 6, 3, 0)
-    stack = [
-        policies.initial_parameters(policy, policies.Categorical(), rng) for _ in range(n_networks)
-    ]
+    policy = make_policy(Categorical(), (10, 20), 6, 3, 0)
+    stack = [initial_parameters(policy, Categorical(), rng) for _ in range(n_networks)]
     moments = np.zeros((n_networks, 2, stack[0].size), np.float32)
     gradient = np.empty_like(stack[0])
     units, deltas = np.empty((2, policy.sizes.sum(), networks.padded(n)), np.float32)
@@ -232,7 +230,7 @@ def compiled_update(n_networks: int, n: int) -> Callable[[], int]:
 
     def update() -> int:
         for parameters, (first, second) in zip(stack, moments, strict=True):
-            policies.likelihood_gradient(
+            likelihood.likelihood_gradient(
                 policy, parameters, states, actions, v, units, deltas, gradient
             )
             networks.adam_step(parameters, gradient, first, second, 1, 1e-3)

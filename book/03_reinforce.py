@@ -36,7 +36,8 @@ from report.captions import captioned
 from report.claims import details, record, verdicts, what_it_would_take
 from report.figure_data import offer
 from report.seeds import premise
-from rl_core.rollouts import rollout, weights_of
+from rl_core.evaluation import as_learned, rollout
+from rl_core.training import weights_of
 from studies import reinforce as study
 
 look.use_style()
@@ -217,8 +218,10 @@ def film(name, env_id, text):
     config = next(a.config for a in study.arms() if a.name == arm)
     seed, arrays = study.median_seed(curves, arm), results.arrays(arm)
     trained, untrained = (weights_of(arrays, seed, moment) for moment in ("", "initial/"))
-    after = rollout(env_id, config, trained, np.random.default_rng(0), 1_000)
-    before = rollout(env_id, config, untrained, np.random.default_rng(0), len(after.rewards))
+    after = rollout(env_id, as_learned(config, trained), np.random.default_rng(0), 1_000)
+    before = rollout(
+        env_id, as_learned(config, untrained), np.random.default_rng(0), len(after.rewards)
+    )
     glue(f"{name}-seed", seed, display=False)
     return drawings.before_and_after(env_id, before, after, description=text)
 

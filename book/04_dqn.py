@@ -36,8 +36,8 @@ from report import provenance
 from report.captions import captioned
 from report.claims import details, record, verdicts, what_it_would_take
 from report.seeds import premise
-from rl_core.q_networks import q_rollout
-from rl_core.rollouts import weights_of
+from rl_core.evaluation import of_values, rollout
+from rl_core.training import weights_of
 from studies import dqn as study
 
 look.use_style()
@@ -272,7 +272,10 @@ for title, arm in (
 ):
     position = study.median_seed(curves, arm)
     weights = weights_of(results.arrays(arm), position)
-    policies[title] = weights, q_rollout("MountainCar-v0", weights, np.random.default_rng(0), 1_000)
+    policies[title] = (
+        weights,
+        rollout("MountainCar-v0", of_values(weights), np.random.default_rng(0), 1_000),
+    )
 drawings.plane_table(policies).to_csv(DATA / "figure_s4_4.csv", index=False)
 drawings.state_plane(policies)
 
@@ -292,9 +295,9 @@ def film(name, text):
     position, arrays = study.median_seed(curves, arm), results.arrays(arm)
     trained, untrained = (weights_of(arrays, position, moment) for moment in ("", "initial/"))
     # The trained agent acts as it did at the end of its training, one action in ten at random.
-    after = q_rollout(study.ENV[name], trained, np.random.default_rng(0), 1_000, epsilon=0.1)
+    after = rollout(study.ENV[name], of_values(trained, 0.1), np.random.default_rng(0), 1_000)
     long = len(after.rewards)
-    before = q_rollout(study.ENV[name], untrained, np.random.default_rng(0), long, epsilon=0.9)
+    before = rollout(study.ENV[name], of_values(untrained, 0.9), np.random.default_rng(0), long)
     glue(f"{name}-seed", study.SEEDS[position], display=False)
     return before_and_after(study.ENV[name], before, after, description=text)
 

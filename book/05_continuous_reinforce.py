@@ -36,7 +36,8 @@ from report import provenance
 from report.captions import captioned
 from report.claims import details, record, verdicts, what_it_would_take
 from report.seeds import SEEDS, premise
-from rl_core.rollouts import rollout, weights_of
+from rl_core.evaluation import as_learned, rollout
+from rl_core.training import weights_of
 from studies import continuous as study
 from studies import continuous_fates as what_became
 
@@ -353,10 +354,9 @@ picture
 
 # %% tags=["hide-input"]
 trained, untrained = (weights_of(arrays, good, moment) for moment in ("", "initial/"))
-after = rollout(study.ENV, study.config(arm), trained, np.random.default_rng(0), 1_000)
-before = rollout(
-    study.ENV, study.config(arm), untrained, np.random.default_rng(0), len(after.rewards)
-)
+after, before = as_learned(study.config(arm), trained), as_learned(study.config(arm), untrained)
+after = rollout(study.ENV, after, np.random.default_rng(0), 1_000)
+before = rollout(study.ENV, before, np.random.default_rng(0), len(after.rewards))
 before_and_after(
     study.ENV,
     before,

@@ -117,6 +117,11 @@ def _range(low: float, high: float, above: float, below: float) -> str:
     return " ".join(["a number" if bounded else "a finite number", *parts])
 
 
+def positive(name: str, value: object) -> float:
+    """Return a finite number above 0; see `number`."""
+    return number(name, value, above=0)
+
+
 def truth(name: str, value: object) -> bool:
     """Return a truth value, Python's or numpy's.
 

@@ -9,48 +9,58 @@
                 L(theta) = 1 / |B| sum (r + gamma max_a' Q(s', a'; theta-) - Q(s, a; theta))^2
             every so many updates: theta- <- theta
 
-The lines stand in `rl_core.q_episodes` (the loop), `rl_core.q_update` (targets and update) and
-`rl_core.replay` (the memory). A terminal s' has no value; a step cut short by a cap is
-bootstrapped.
-
-CartPole-v1 trains through the plain loop. With these settings the average return of the last 50
-training episodes is 450 or more for most seeds (`tests/test_dqn.py` holds them to it):
-
-    config = DQNConfig(
-        hidden=(64, 64), biases=True, optimiser="adam", learning_rate=1e-3,
-        batch_size=128, memory_size=100_000, learning_starts=500,
-        update_every=2, copy_every=100, epsilon=Decay(1.0, 0.0, 5_000),
-        shaping=Shaping("rl_core.shaping:balance"), max_env_steps=80_000,
-    )
-    run = dqn("CartPole-v1", config, episodes=2_000, seeds=range(10))
+`play` is the loop and `TorchLearner` the learner. A terminal s' has no value; a step cut short by a
+cap is bootstrapped.
 
 Sources: V. Mnih et al. (2015), Human-level control through deep reinforcement learning; R. S.
 Sutton and A. G. Barto, Reinforcement Learning: An Introduction (2018), sections 6.5 and 16.5.
 """
 
 import math
-import sys
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Iterable
+from contextlib import closing
+from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
-import pandas as pd
+import torch
+from numba.extending import overload, register_jitable
 from numpy.typing import NDArray
 
-from rl_core import networks
-from rl_core.episodes import EnvironmentLike, checked_seeds, checked_snapshots, spawn_streams
-from rl_core.epsilon import Decay, Epsilon, HalfWay
-from rl_core.policies import is_integer, is_number, is_one_of, require
-from rl_core.q_episodes import DIVERGED, SHAPED_NAN, Training, World, open_world
-from rl_core.q_update import Settings, make_learner
-from rl_core.replay import make_memory
-from rl_core.run import Failure, Run
-from rl_core.shaping import Shaping, compiled_shape
+from rl_core import modules
+from rl_core.checks import (
+    fields,
+    instance,
+    integer,
+    number,
+    one_of,
+    optional,
+    positive,
+    require,
+    truth,
+)
+from rl_core.exploration import Epsilon, HalfWay, check_epsilon, schedule_state
+from rl_core.kernels import networks, q_update
+from rl_core.kernels.choices import VALUE, after_copy, after_goal, after_step, greedy_action
+from rl_core.kernels.compiled import compiled
+from rl_core.kernels.q_update import ACTION, COPIES, KEPT, STEPS, UPDATES, Learner, Settings
+from rl_core.kernels.replay import Memory, make_memory, sample, store
+from rl_core.policies import MLP, Network, check_network
+from rl_core.training import Progress, Run, Training, spawn_streams, train_seeds
+from rl_core.worlds.environments import (
+    EnvironmentLike,
+    TaskWorld,
+    World,
+    one_seed_of,
+    open_world,
+    step,
+)
+from rl_core.worlds.shaping import ORIGINAL, Shaping, compiled_shape, shaped_reward
 
-PROGRESS_EVERY = 10
-"""Episodes between two reports of progress."""
+WENT_ON, DIVERGED, SHAPED_NAN = range(3)
+"""How an episode's learning went: a loss was not finite, or a shaped reward was NaN."""
 
 
 @dataclass(frozen=True)
@@ -61,25 +71,22 @@ class DQNConfig:
     ----------
     gamma : float
         Discount, from 0 to 1.
-    hidden : tuple of int
-        Widths of the hidden layers, rectified linear units; () for a linear network.
-    biases : bool
-        Whether biases are learned; else they stay zero.
+    network : MLP or Module
+        From what is observed to one value an action.
     optimiser : {"rmsprop", "adam"}
-        With TensorFlow 1's constants (`rl_core.networks`).
+        With TensorFlow 1's constants (`rl_core.kernels.networks`).
     learning_rate : float
         The optimiser's step size alpha, above 0.
     batch_size : int
         Transitions an update.
     memory_size : int
         Transitions kept, at least a batch. As many as a batch: no replay, only the latest ones.
-    learning_starts : int
-        Environment steps before the first update. The report waits until the memory is full.
-    update_every : int
-        Environment steps between two updates.
+    learning_starts, update_every : int
+        Environment steps before the first update (the report waits until the memory is full), and
+        from one to the next.
     copy_every : int
         Updates between two copies to the fixed network. 1: no fixed target.
-    epsilon : float, Decay or HalfWay
+    epsilon : float, Linear or HalfWay
         Probability that a run of one random action begins, where none is going on (the report's
         epsilon is 1 minus it).
     persistence : int
@@ -95,23 +102,24 @@ class DQNConfig:
     max_episode_steps : int or None
         Where to stop an episode that has not ended. None: nowhere.
     max_env_steps : int or None
-        Budget of environment steps a seed. The episode in which it is used up is stopped there and
-        is the seed's last. None: no limit.
+        Budget of environment steps a seed: where it is used up the last episode is stopped. None:
+        no limit.
+    engine : {"compiled", "torch"} or None
+        What learns. None: machine code for an MLP, torch for a Module.
 
     Raises
     ------
-    ValueError
-        For a value out of range.
+    TypeError, ValueError
+        For a value of another kind or out of range.
 
     Examples
     --------
-    >>> DQNConfig(shaping=Shaping("rl_core.shaping:tip_height")).memory_size
+    >>> DQNConfig(shaping=Shaping("rl_core.worlds.shaping:tip_height")).memory_size
     3000
     """
 
     gamma: float = 0.99
-    hidden: tuple[int, ...] = (10, 20)
-    biases: bool = False
+    network: Network = field(default_factory=partial(MLP, biases=False))
     optimiser: Literal["rmsprop", "adam"] = "rmsprop"
     learning_rate: float = 1e-3
     batch_size: int = 512
@@ -125,143 +133,270 @@ class DQNConfig:
     bootstrap_through_end: bool = False
     max_episode_steps: int | None = None
     max_env_steps: int | None = 1_000_000
+    engine: Literal["compiled", "torch"] | None = None
 
     def __post_init__(self) -> None:
-        optimisers = ("rmsprop", "adam")
-        rate, hidden, batch = self.learning_rate, self.hidden, self.batch_size
-        fixed_epsilon = is_number(self.epsilon) and 0 <= self.epsilon <= 1  # type: ignore[operator]
-        checks = {
-            "gamma": (is_number(self.gamma) and 0 <= self.gamma <= 1, "a number from 0 to 1"),
-            "hidden": (
-                isinstance(hidden, tuple) and all(is_integer(width, 1) for width in hidden),
-                "a tuple of positive integers",
-            ),
-            "biases": (isinstance(self.biases, bool), "a bool"),
-            "optimiser": (is_one_of(self.optimiser, optimisers), f"one of {optimisers}"),
-            "learning_rate": (is_number(rate) and rate > 0, "a finite number above 0"),
-            "batch_size": (is_integer(batch, 1), "a positive integer"),
-            "epsilon": (
-                fixed_epsilon or isinstance(self.epsilon, Decay | HalfWay),
-                "a number from 0 to 1, Decay(...) or HalfWay(...)",
-            ),
-            "shaping": (
-                self.shaping is None or isinstance(self.shaping, Shaping),
-                "Shaping('module:function') or None",
-            ),
-            "bootstrap_through_end": (isinstance(self.bootstrap_through_end, bool), "a bool"),
-        }
-        for name in ("learning_starts", "update_every", "copy_every", "persistence"):
-            checks[name] = (is_integer(getattr(self, name), 1), "a positive integer")
-        for name in ("max_episode_steps", "max_env_steps"):
-            value = getattr(self, name)
-            checks[name] = (value is None or is_integer(value, 1), "a positive integer or None")
-        for name, (valid, allowed) in checks.items():
-            require(valid, name, getattr(self, name), allowed)
-        enough = is_integer(self.memory_size, batch)
-        allowed = f"an integer of at least batch_size ({batch})"
-        require(enough, "memory_size", self.memory_size, allowed)
+        counts = ("batch_size", "learning_starts", "update_every", "copy_every", "persistence")
+        fields(
+            self,
+            gamma=(number, 0, 1),
+            network=(instance, Network, "MLP(...) or Module('module:function')"),
+            optimiser=(one_of, ("rmsprop", "adam")),
+            learning_rate=(positive,),
+            epsilon=(check_epsilon,),
+            shaping=(optional, instance, Shaping, "Shaping('module:function')"),
+            bootstrap_through_end=(truth,),
+            max_episode_steps=(optional, integer, 1),
+            max_env_steps=(optional, integer, 1),
+            **dict.fromkeys(counts, (integer, 1)),
+        )
+        allowed = f"an integer of at least batch_size ({self.batch_size})"
+        size = integer("memory_size", self.memory_size, 1)
+        require(size >= self.batch_size, "memory_size", size, allowed)
+        object.__setattr__(self, "engine", check_network(self.network, self.engine))
 
 
-_ORIGINAL = "rl_core.shaping:original"
+class TorchLearner:
+    """DQN as its equation says, for any network; `Learner` is its compiled counterpart.
+
+    Parameters
+    ----------
+    network : torch.nn.Module
+        Q(s, .; theta).
+    settings : Settings
+    epsilon : float64 array
+        State of the schedule of epsilon.
+    """
+
+    def __init__(
+        self, network: torch.nn.Module, settings: Settings, epsilon: NDArray[np.float64]
+    ) -> None:
+        self.network, self.fixed = network, deepcopy(network)
+        self.settings, self.epsilon = settings, epsilon
+        self.counts = np.zeros(5, np.int64)
+        self.slots = np.empty(settings.batch_size, np.int64)
+        learned = [p for p in network.parameters() if p.requires_grad]
+        kind = modules.Adam if settings.adam else modules.RMSProp
+        self.optimiser = kind(learned, lr=settings.learning_rate)
+
+    def loss(self, memory: Memory) -> torch.Tensor:
+        """1 / |B| sum_B (y - Q(s, a; theta))^2 over the sampled batch B.
+
+        y = r + gamma max_a' Q(s', a'; theta-), or r if s' is terminal.
+        """
+        s, s_next, a, r, end = (torch.from_numpy(array[self.slots]) for array in memory[:5])
+        with torch.no_grad():
+            y = r + self.settings.gamma * self.fixed(s_next).amax(1)
+            if not self.settings.through_end:
+                y = torch.where(end, r, y)
+        q = self.network(s).gather(1, a[:, None]).squeeze(1)
+        return ((y - q) ** 2).mean()
+
+    def update(self, memory: Memory) -> bool:
+        """Take one step of the optimiser, and copy the network when it is time.
+
+        Returns False, and changes nothing, if the loss is not finite.
+        """
+        loss = self.loss(memory)
+        if not torch.isfinite(loss):
+            return False
+        self.optimiser.zero_grad()
+        loss.backward()
+        self.optimiser.step()
+        self.counts[UPDATES] += 1
+        if self.counts[UPDATES] % self.settings.copy_every == 0:
+            self.fixed.load_state_dict(self.network.state_dict())
+            self.counts[COPIES] += 1
+            after_copy(self.epsilon)
+        return True
+
+    def q_values(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
+        """Q(s, .; theta) of one state."""
+        with torch.no_grad():
+            return self.network(torch.from_numpy(observation)[None])[0].numpy().astype(np.float64)
 
 
-@dataclass
-class _Seed:
-    """What became of one seed."""
-
-    seed: int
-    parameters: NDArray[np.float32]
-    snapshots: dict[str, NDArray[np.float32]]
-    rows: list[tuple[int, float, bool]] = field(default_factory=list)  # steps, return, terminated
-    env_steps: int = 0
-    failure: Failure | None = None
+def q_values(learner: Learner | TorchLearner, observation: NDArray[np.float32]) -> Any:
+    """Q(s, .; theta) of one state, float64 of shape (A,)."""
+    if isinstance(learner, Learner):
+        return q_update.q_values(learner, observation)
+    return learner.q_values(observation)
 
 
-def _training(world: World, config: DQNConfig, seed: int) -> tuple[Training, NDArray[np.float32]]:
-    """Set up a seed: its streams, first weights and empty memory."""
-    streams = spawn_streams(seed)
-    world.seed(streams.environment_seed)
-    sizes = (world.n_observations, *config.hidden, world.n_actions)
-    parameters = networks.xavier_uniform(sizes, streams.network)
-    adam = config.optimiser == "adam"
-    learner = make_learner(
-        sizes,
-        parameters,
-        biases=config.biases,
-        adam=adam,
-        batch_size=config.batch_size,
-        schedule=config.epsilon,
+def update(learner: Learner | TorchLearner, memory: Memory) -> bool:
+    """Move theta towards the targets of the sampled batch; false if the loss is not finite."""
+    if isinstance(learner, Learner):
+        return q_update.update(learner, memory)
+    return learner.update(memory)
+
+
+# What the two mean in compiled code.
+overload(q_values)(
+    lambda learner, observation: (
+        lambda learner, observation: q_update.q_values(learner, observation)
     )
+)
+overload(update)(lambda learner, memory: lambda learner, memory: q_update.update(learner, memory))
+
+
+@register_jitable
+def act(learner: Any, observation: NDArray[np.float32], u: float, v: float) -> int:
+    """Act epsilon-greedily; a random action is kept for `persistence` steps.
+
+    Parameters
+    ----------
+    learner : Learner or TorchLearner
+        Its `counts` are changed.
+    observation : float32 array of shape (n_observations,)
+    u, v : float
+        Uniforms in [0, 1): u decides whether to explore, v picks among random or tied actions.
+
+    Examples
+    --------
+    >>> way = Settings(0.9, 2, 1, 1, 10, 3, 1e-3, True, False, 3)  # persistence 3
+    >>> theta = np.array([0, 0, 1, 0, 0, 0], np.float32)
+    >>> learner = q_update.make_learner((1, 3), theta, way, schedule_state(0.1), biases=False)
+    >>> [act(learner, np.ones(1, np.float32), u, 0.0) for u in (0.5, 0.05, 0.5, 0.5, 0.5)]
+    [2, 0, 0, 0, 2]
+    """
+    counts = learner.counts
+    if counts[KEPT] > 0:
+        counts[KEPT] -= 1
+        return int(counts[ACTION])
+    if u >= learner.epsilon[VALUE]:
+        return int(greedy_action(q_values(learner, observation), v))
+    counts[KEPT] = learner.settings.persistence - 1
+    counts[ACTION] = int(v * learner.settings.n_actions)
+    return int(counts[ACTION])
+
+
+def play(
+    stepper: Any,
+    learner: Any,
+    memory: Memory,
+    shape: Any,
+    observation: NDArray[np.float32],
+    policy_rng: np.random.Generator,
+    replay_rng: np.random.Generator,
+    max_steps: int,
+) -> tuple[int, float, bool, int]:
+    """Play and learn from one episode; `observation`, its first, is overwritten.
+
+    Plain Python as it stands, for any world and network; `_play_compiled` is the same text for
+    compiled tasks and perceptrons. Returns the steps, the sum of the environment's own rewards,
+    whether the episode terminated, and how the learning went.
+    """
+    settings, counts = learner.settings, learner.counts
+    following, action = np.empty_like(observation), np.empty(1, np.float32)
+    total, terminated, truncated, t = 0.0, False, False, 0
+    while t < max_steps and not (terminated or truncated):
+        action[0] = act(learner, observation, policy_rng.random(), policy_rng.random())
+        reward, terminated, truncated = step(stepper, action, following)
+        t += 1
+        total += reward
+        shaped = shaped_reward(shape, following, reward)
+        if math.isnan(shaped):
+            return t, total, False, SHAPED_NAN
+        store(memory, observation, int(action[0]), shaped, following, terminated)
+        counts[STEPS] += 1
+        after_step(learner.epsilon, counts[STEPS])
+        if counts[STEPS] >= settings.learning_starts and counts[STEPS] % settings.update_every == 0:
+            sample(memory, replay_rng.random(settings.batch_size), learner.slots)
+            if not update(learner, memory):
+                return t, total, False, DIVERGED
+        observation[:] = following
+    counts[KEPT] = 0
+    if terminated:
+        after_goal(learner.epsilon)
+    return t, total, terminated, WENT_ON
+
+
+_play_compiled = compiled(play)
+
+
+def _make_learner(
+    config: DQNConfig, world: World, rng: np.random.Generator
+) -> tuple[Learner | TorchLearner, Callable[[], dict[str, NDArray[Any]]]]:
+    """Draw the initial weights; return who learns them, and what gives them by name."""
+    require(world.n_actions > 0, "env", "a Box action space", "an environment of Discrete actions")
     settings = Settings(
-        float(config.gamma),
+        config.gamma,
         config.batch_size,
         config.learning_starts,
         config.update_every,
         config.copy_every,
         config.persistence,
-        float(config.learning_rate),
-        adam,
+        config.learning_rate,
+        config.optimiser == "adam",
         config.bootstrap_through_end,
+        world.n_actions,
     )
-    shape = compiled_shape(config.shaping.function if config.shaping else _ORIGINAL)
+    epsilon = schedule_state(config.epsilon)
+    if not isinstance(config.network, MLP):
+        module = modules.make_module(config.network, world.n_observations, world.n_actions, rng)
+        return TorchLearner(module, settings, epsilon), partial(modules.as_arrays, module)
+    sizes, biases = (
+        (world.n_observations, *config.network.hidden, world.n_actions),
+        config.network.biases,
+    )
+    parameters = networks.xavier_uniform(sizes, rng)
+
+    def layers() -> dict[str, NDArray[Any]]:
+        named = networks.unpack(sizes, parameters)
+        return {name: array for name, array in named.items() if biases or "bias" not in name}
+
+    if config.engine == "torch":
+        network = modules.perceptron(sizes, parameters, biases)
+        return TorchLearner(network, settings, epsilon), layers
+    return q_update.make_learner(sizes, parameters, settings, epsilon, biases=biases), layers
+
+
+def _train(world: World, config: DQNConfig, training: Training) -> None:
+    """Train one seed."""
+    streams = spawn_streams(training.seed)
+    world.seed(streams.environment_seed)
+    learner, arrays = _make_learner(config, world, streams.network)
+    training.keep("initial/", arrays())
     memory = make_memory(config.memory_size, world.n_observations)
-    training = Training(settings, learner, memory, shape, streams.policy, streams.replay)
-    return training, parameters
-
-
-def _train(
-    world: World,
-    config: DQNConfig,
-    episodes: int,
-    seed: int,
-    snapshots: Collection[int],
-    report: Callable[[int, int], object],
-) -> _Seed:
-    """Train one seed, and tell `report` its episodes and environment steps so far."""
-    training, parameters = _training(world, config, seed)
-    trained = _Seed(seed, parameters, {"initial/": parameters.copy()})
-    budget = config.max_env_steps or sys.maxsize
-    for episode in range(1, episodes + 1):
-        max_steps = min(config.max_episode_steps or sys.maxsize, budget - trained.env_steps)
-        steps, total, terminated, outcome = world.play(training, max_steps)
-        trained.rows.append((steps, total, terminated))
-        trained.env_steps += steps
+    shape = compiled_shape(config.shaping.function if config.shaping else ORIGINAL)
+    rngs = streams.policy, streams.replay
+    both = isinstance(world, TaskWorld) and isinstance(learner, Learner)
+    play_episode = _play_compiled if both else play
+    for episode in training.course(config.max_env_steps):
+        max_steps = training.max_steps(config.max_episode_steps, world.max_episode_steps)
+        first = world.reset()
+        steps, total, terminated, outcome = play_episode(
+            world.stepper, learner, memory, shape, first, *rngs, max_steps
+        )
         if outcome == SHAPED_NAN and config.shaping is not None:
             raise ValueError(
                 f"shaping {config.shaping.function!r} returned NaN at step {steps} of episode "
-                f"{episode}, seed {seed}"
+                f"{episode}, seed {training.seed}"
             )
-        if not math.isfinite(total):
-            trained.failure = Failure(seed, episode, f"the return is {total}")
-            break
-        if outcome == DIVERGED or not np.isfinite(parameters).all():
-            trained.failure = Failure(seed, episode, "the loss or a weight is not finite")
-            break
-        if episode in snapshots:
-            trained.snapshots[f"episode{episode}/"] = parameters.copy()
-        if episode % PROGRESS_EVERY == 0:
-            report(episode, trained.env_steps)
-        if trained.env_steps >= budget:
-            break
-    return trained
+        training.add(steps, total, terminated)
+        if outcome == DIVERGED or not all(np.isfinite(array).all() for array in arrays().values()):
+            training.fail("the loss or a weight is not finite")
+        if training.wants(episode):
+            training.keep(f"episode{episode}/", arrays())
+    training.keep("", arrays())
 
 
 def check_dqn(env: EnvironmentLike, config: DQNConfig) -> None:
     """Raise what `dqn` would raise for an environment and a configuration; run nothing.
 
-    `rl_core.experiments.run` calls it for every arm before it begins with any.
-
     Raises
     ------
     ValueError, TypeError
-        If `config` is no DQNConfig, the environment unknown, or its spaces of another kind.
+        If `config` is no DQNConfig, the environment unknown, its spaces of another kind, or the
+        network's output of another shape.
 
     Examples
     --------
     >>> check_dqn("MountainCar-v0", DQNConfig())
     """
-    require(isinstance(config, DQNConfig), "config", config, "a DQNConfig")
-    open_world(env).close()
+    instance("config", config, DQNConfig, "a DQNConfig")
+    with closing(open_world(env)) as world:
+        _make_learner(config, world, np.random.default_rng(0))
 
 
 def dqn(
@@ -270,42 +405,28 @@ def dqn(
     *,
     episodes: int,
     seeds: Iterable[int],
-    snapshots: Collection[int] = (),
-    progress: Callable[[int, int], object] | None = None,
+    snapshots: Iterable[int] = (),
+    progress: Progress | None = None,
 ) -> Run:
     """Train one network a seed with DQN.
 
-    Seeds share nothing, the memory included: a seed gives the same bits alone and among any others.
-
     Parameters
     ----------
-    env : str, gymnasium.Env or callable
-        A Gymnasium id, an environment, or a function that makes one, with Box observations and
-        Discrete actions. Acrobot-v1 and MountainCar-v0, given by id, are played compiled and
-        without time limit; anything else goes through Gymnasium's own `reset` and `step`.
+    env : str, Make, Task, gymnasium.Env or callable
+        With Box observations and Discrete actions; see `rl_core.worlds.environments.open_world`.
+        Acrobot-v1 and MountainCar-v0 are played compiled and without time limit. One that is given
+        ready made is for one seed only, as what it remembers would go from seed to seed.
     config : DQNConfig
-    episodes : int
-        Episodes a seed, at least 1.
-    seeds : iterable of int
-        Distinct and non-negative.
-    snapshots : collection of int
-        Episodes, from 0 to `episodes`, after which to keep a copy of the weights. The initial ones,
-        before the first episode, are kept anyway.
-    progress : callable, optional
-        Called now and then with the episodes and environment steps done, over all seeds. A seed
-        that ended early counts with all its episodes.
+    episodes, seeds, snapshots, progress
+        See `rl_core.training.train_seeds`. The initial weights are kept in any case.
 
     Returns
     -------
     Run
-        `table` has the columns `seed`, `episode` (from 1), `steps`, `return` (undiscounted, of the
-        environment's own rewards also where they are shaped), `terminated` (false: stopped by a
-        cap) and `env_steps` (of this seed so far). Rows of a seed that diverged or used up its
-        budget end there, that episode included.
-        `arrays` holds, with one row a seed, the last weights as `layer0.weight` of shape
-        (seeds, inputs, outputs), `layer0.bias` and so on, and copies under `initial/...` and
-        `episode20/...`, which are the last weights of seeds that ended before. `failures` names
-        seeds whose returns, loss or weights were no longer finite.
+        The returns of its table are of the environment's own rewards also where they are shaped. Its
+        arrays hold the last weights, those of an MLP as `layer0.weight` of shape (seeds, inputs,
+        outputs), `layer0.bias` and so on, those of a module under its own names, and copies under
+        `initial/...` and `episode20/...`.
 
     Raises
     ------
@@ -320,60 +441,13 @@ def dqn(
     >>> run.table["steps"].tolist(), run.arrays["layer0.weight"].shape
     ([200, 200, 200, 200], (2, 2, 10))
     """
-    seeds = checked_seeds(seeds)
-    require(isinstance(config, DQNConfig), "config", config, "a DQNConfig")
-    require(is_integer(episodes, 1), "episodes", episodes, "a positive integer")
-    snapshots = checked_snapshots(snapshots, episodes)
-    allowed = "a function of episodes and steps, or None"
-    require(progress is None or callable(progress), "progress", progress, allowed)
-    trained: list[_Seed] = []
-    for seed in seeds:
-        steps_before = sum(one.env_steps for one in trained)
-        report = partial(_report, progress, len(trained) * episodes, steps_before)
-        world = open_world(env)
-        try:
-            sizes = (world.n_observations, *config.hidden, world.n_actions)
-            trained.append(_train(world, config, episodes, seed, snapshots, report))
-        finally:
-            world.close()
-        report(episodes, trained[-1].env_steps)
-    failures = tuple(one.failure for one in trained if one.failure is not None)
-    return Run(_table(trained), _arrays(sizes, config.biases, trained, snapshots), failures)
+    check_dqn(env, config)
 
+    def train(training: Training) -> None:
+        with closing(open_world(env)) as world, modules.reproducible():
+            _train(world, config, training)
 
-def _report(
-    progress: Callable[[int, int], object] | None,
-    episodes_before: int,
-    steps_before: int,
-    episode: int,
-    env_steps: int,
-) -> None:
-    """Add a seed's episodes and steps to those of the seeds before it, and tell `progress`."""
-    if progress is not None:
-        progress(episodes_before + episode, steps_before + env_steps)
-
-
-def _table(trained: Sequence[_Seed]) -> pd.DataFrame:
-    """One row an episode, seeds in the order asked for."""
-    tables = []
-    for one in trained:
-        table = pd.DataFrame(one.rows, columns=["steps", "return", "terminated"])
-        table.insert(0, "seed", one.seed)
-        table.insert(1, "episode", np.arange(1, len(table) + 1))
-        table["env_steps"] = table["steps"].cumsum()
-        tables.append(table)
-    return pd.concat(tables, ignore_index=True)
-
-
-def _arrays(
-    sizes: Sequence[int], biases: bool, trained: Sequence[_Seed], snapshots: Collection[int]
-) -> dict[str, NDArray[np.float32]]:
-    """Weights by name, stacked over seeds: the last, the first, and those of the snapshots."""
-    arrays = {}
-    moments = [f"episode{episode}/" for episode in sorted(set(snapshots) - {0})]
-    for moment in ["", "initial/", *moments]:
-        stacked = np.stack([one.snapshots.get(moment, one.parameters) for one in trained])
-        for name, array in networks.unpack(sizes, stacked).items():
-            if biases or not name.endswith("bias"):
-                arrays[moment + name] = np.ascontiguousarray(array)
-    return arrays
+    seeds = one_seed_of(env, seeds)
+    return train_seeds(
+        train, episodes=episodes, seeds=seeds, snapshots=snapshots, progress=progress
+    )

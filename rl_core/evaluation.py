@@ -11,20 +11,25 @@ one that acts at random: its preferences are equal. Greedy tables are evaluated 
 """
 
 from collections.abc import Callable, Mapping
+from contextlib import closing
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from gymnasium import spaces
 from numpy.typing import NDArray
 
-from rl_core import networks
-from rl_core.compiled import compiled
-from rl_core.discretise import Binned, start_binned, step_binned
-from rl_core.episodes import EnvironmentLike, Trajectory, check_fit, open_environment
-from rl_core.exploration import EPSILON_GREEDY, choose
-from rl_core.policies import Policy, is_integer, require
+from rl_core.checks import floats, generator, instance, integer, number, require
+from rl_core.episodes import Trajectory, play_episode
+from rl_core.kernels import likelihood, networks
+from rl_core.kernels.choices import EPSILON_GREEDY, choose
+from rl_core.kernels.compiled import compiled
+from rl_core.kernels.likelihood import Policy
+from rl_core.policies import Gaussian
 from rl_core.reinforce import ReinforceConfig
-from rl_core.rollouts import policy_of
+from rl_core.worlds.discretise import GriddedTask, start_gridded, step_gridded
+from rl_core.worlds.environments import EnvironmentLike, World, open_world
 
 SPAWN_KEY = (1_000,)
 """Names the streams of evaluation among a seed's; learners use small numbers."""
@@ -38,21 +43,27 @@ COLUMNS = (
 )
 """The columns of a table of evaluation, besides the measures."""
 
+Weights = Mapping[str, NDArray[np.float32]]
+"""The weights of one seed by name, as `rl_core.training.weights_of` takes them out of a run."""
+
 Measure = Callable[[NDArray[np.float32], NDArray[np.float32], NDArray[np.float64]], float]
 """Observations, actions and rewards of an episode to a number."""
 
 
 class Agent(NamedTuple):
-    """A stochastic policy with its parameters, see `rl_core.policies`.
+    """A stochastic policy with its parameters, see `rl_core.kernels.likelihood`.
 
     Attributes
     ----------
     policy : Policy
     parameters : float32 array of shape (P,)
+    epsilon : float
+        Probability of a uniformly random action instead, where actions are discrete.
     """
 
     policy: Policy
     parameters: NDArray[np.float32]
+    epsilon: float = 0.0
 
 
 def as_learned(config: ReinforceConfig, weights: Mapping[str, NDArray[np.float32]]) -> Agent:
@@ -63,24 +74,24 @@ def as_learned(config: ReinforceConfig, weights: Mapping[str, NDArray[np.float32
     config : ReinforceConfig
         Of the run that made the weights.
     weights : mapping of str to array
-        Of one seed, as `rl_core.rollouts.weights_of` gives them.
+        Of one seed, as `rl_core.training.weights_of` gives them.
 
     Raises
     ------
     ValueError
-        As `rl_core.rollouts.policy_of`.
+        The configuration and the weights do not go together.
 
     Examples
     --------
     >>> weights = {"layer0.weight": np.zeros((2, 3), np.float32)}
-    >>> as_learned(ReinforceConfig(hidden=()), weights).policy.sizes
+    >>> as_learned(ReinforceConfig(network=MLP(())), weights).policy.sizes
     array([2, 3])
     """
-    return Agent(*policy_of(config, weights))
+    return Agent(*_policy_of(config, weights))
 
 
-def of_values(weights: Mapping[str, NDArray[np.float32]]) -> Agent:
-    """Return the greedy policy of a network that puts out one action value an action.
+def of_values(weights: Mapping[str, NDArray[np.float32]], epsilon: float = 0.0) -> Agent:
+    """Return the epsilon-greedy policy of a network that puts out one action value an action.
 
     Examples
     --------
@@ -89,7 +100,8 @@ def of_values(weights: Mapping[str, NDArray[np.float32]]) -> Agent:
     array([1., 2.], dtype=float32)
     """
     sizes, parameters = networks.pack(weights)
-    return greedy(Agent(Policy(np.array(sizes), False, False, False, 1), parameters))
+    agent = greedy(Agent(Policy(np.array(sizes), False, False, False, 1), parameters))
+    return agent._replace(epsilon=number("epsilon", epsilon, 0, 1))
 
 
 def greedy(agent: Agent) -> Agent:
@@ -187,32 +199,29 @@ def evaluate(
     >>> table["return"].tolist(), table["terminated"].tolist()
     ([-50.0, -50.0], [False, False])
     """
-    _check(seed, episodes, max_steps, limit)
-    require(isinstance(agent, Agent), "agent", agent, "an Agent")
+    seed, episodes, max_steps, limit = _checked(seed, episodes, max_steps, limit)
+    instance("agent", agent, Agent, "an Agent")
     measures = _checked_measures(measures)
-    policy, parameters = agent
     environment_seed, rng = evaluation_streams(seed)
-    environment = open_environment(env)
-    try:
-        check_fit(policy, parameters, environment, "agent")
-        environment.seed(environment_seed)
-        trajectory = Trajectory(environment.n_observations, policy.action_width)
+    with closing(open_world(env)) as world:
+        check_fit(agent, world)
+        world.seed(environment_seed)
+        actor = likelihood.make_actor(*agent)
+        trajectory = Trajectory(world.n_observations, agent.policy.action_width)
         rows = []
         for _ in range(episodes):
-            steps, terminated = environment.play(policy, parameters, rng, max_steps, trajectory)
+            steps, terminated = play_episode(world, actor, rng, max_steps, trajectory)
             _, actions, rewards = trajectory.first(steps)
             row = {"steps": steps, "return": rewards.sum(), "terminated": terminated}
             row["limited_return"] = rewards[: limit or max_steps].sum()
             for name, measure in measures.items():
                 row[name] = measure(trajectory.observations[: steps + 1], actions, rewards)
             rows.append(row)
-    finally:
-        environment.close()
     return _table(pd.DataFrame(rows), limit)
 
 
 def evaluate_table(
-    world: Binned,
+    world: GriddedTask,
     Q: NDArray[np.float64],
     *,
     seed: int,
@@ -224,8 +233,8 @@ def evaluate_table(
 
     Parameters
     ----------
-    world : Binned
-        See `rl_core.discretise.binned`.
+    world : GriddedTask
+        See `rl_core.worlds.discretise.gridded`.
     Q : float64 array of shape `world.shape`
         Action values, without NaN. Of several largest ones, one is drawn.
     seed, episodes, max_steps, limit
@@ -243,20 +252,15 @@ def evaluate_table(
 
     Examples
     --------
-    >>> from rl_core.discretise import binned
-    >>> world = binned("MountainCar-v0", 10)
+    >>> from rl_core.worlds.discretise import gridded
+    >>> world = gridded("MountainCar-v0", 10)
     >>> table = evaluate_table(world, np.zeros(world.shape), seed=0, episodes=1, max_steps=9)
     >>> table["steps"].item(), table["terminated"].item()
     (9, False)
     """
-    _check(seed, episodes, max_steps, limit)
-    require(isinstance(world, Binned), "world", world, "a Binned")
-    require(isinstance(Q, np.ndarray), "Q", Q, "an array of numbers")
-    require(Q.shape == world.shape, "Q", Q.shape, f"of shape {world.shape}")
-    require(Q.dtype.kind in "fiu", "Q", Q.dtype, "an array of numbers")
-    unknown = int(np.isnan(Q).sum())
-    require(unknown == 0, "Q", f"{unknown} of them", "without NaN")
-    Q = Q.astype(np.float64)
+    seed, episodes, max_steps, limit = _checked(seed, episodes, max_steps, limit)
+    instance("world", world, GriddedTask, "a GriddedTask (rl_core.worlds.discretise.gridded)")
+    Q = floats("Q", Q, world.shape, finite=False)
     environment_seed, rng = evaluation_streams(seed)
     starts = np.random.default_rng(environment_seed)
     played = np.empty((episodes, 4))
@@ -277,7 +281,7 @@ def _table(table: pd.DataFrame, limit: int | None) -> pd.DataFrame:
 
 @compiled
 def _play_table(
-    world: Binned,
+    world: GriddedTask,
     Q: NDArray[np.float64],
     starts: np.random.Generator,
     rng: np.random.Generator,
@@ -287,11 +291,11 @@ def _play_table(
 ) -> None:
     """Write steps, return, end and limited return of every episode."""
     for k in range(len(played)):
-        s = start_binned(world, starts)
+        s = start_gridded(world, starts)
         steps, total, limited, terminated = 0, 0.0, 0.0, False
         while steps < max_steps and not terminated:
             a = choose(EPSILON_GREEDY, 0.0, Q[s], rng.random(), rng.random())
-            s, reward, terminated = step_binned(world, a)
+            s, reward, terminated = step_gridded(world, a)
             total += reward
             limited += reward if steps < limit else 0.0
             steps += 1
@@ -310,9 +314,277 @@ def _checked_measures(measures: Mapping[str, Measure] | None) -> Mapping[str, Me
     return measures
 
 
-def _check(seed: int, episodes: int, max_steps: int, limit: int | None) -> None:
-    require(is_integer(seed, 0), "seed", seed, "an integer from 0")
-    require(is_integer(episodes, 1), "episodes", episodes, "a positive integer")
-    require(is_integer(max_steps, 1), "max_steps", max_steps, "a positive integer")
-    valid = limit is None or (is_integer(limit, 1) and limit <= max_steps)
-    require(valid, "limit", limit, f"None or an integer from 1 to max_steps ({max_steps})")
+def _checked(
+    seed: int, episodes: int, max_steps: int, limit: int | None
+) -> tuple[int, int, int, int | None]:
+    max_steps = integer("max_steps", max_steps, 1)
+    if limit is not None:
+        limit = integer("limit", limit, 1, max_steps)
+    return integer("seed", seed), integer("episodes", episodes, 1), max_steps, limit
+
+
+def check_fit(agent: Agent, world: World) -> None:
+    """Raise unless an agent takes the observations of a world and puts out its actions.
+
+    Raises
+    ------
+    ValueError
+        If the number of inputs, the kind or number of actions, or of parameters is another.
+
+    Examples
+    --------
+    >>> check_fit(uniform(2, 5), open_world("MountainCar-v0"))
+    Traceback (most recent call last):
+    ValueError: agent must be a categorical policy of 3 actions, got a categorical policy of 5
+    """
+    policy, parameters, _ = agent
+    inputs = world.n_observations + policy.constant_feature
+    sizes = policy.sizes.tolist()
+    require(sizes[0] == inputs, "agent", sizes, f"a network of {inputs} inputs")
+    if world.n_actions > 0:
+        allowed = f"a categorical policy of {world.n_actions} actions"
+        fits = not policy.gaussian and sizes[-1] == world.n_actions
+    else:
+        allowed = f"a Gaussian policy of {world.action_dimensions} components"
+        fits = policy.gaussian and policy.action_width == world.action_dimensions
+    if not fits:
+        kind = "Gaussian" if policy.gaussian else "categorical"
+        width = policy.action_width if policy.gaussian else sizes[-1]
+        raise ValueError(f"agent must be {allowed}, got a {kind} policy of {width}")
+    count = networks.count_parameters(sizes) + policy.gaussian * policy.action_width
+    shape = np.shape(parameters)
+    require(shape == (count,), "agent", shape, f"a policy with parameters of shape ({count},)")
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """One episode, for a picture or an animation.
+
+    Attributes
+    ----------
+    observations : float32 array of shape (T + 1, n_observations)
+    actions : float32 array of shape (T, action_width)
+        Indices of discrete actions, or continuous actions as drawn.
+    rewards : float64 array of shape (T,)
+    terminated : bool
+        False if stopped at `max_steps`, or truncated by the environment.
+    environment_seed : int
+        `env.reset(seed=environment_seed)` and the actions play the episode again in Gymnasium.
+    """
+
+    observations: NDArray[np.float32]
+    actions: NDArray[np.float32]
+    rewards: NDArray[np.float64]
+    terminated: bool
+    environment_seed: int
+
+
+def rollout(
+    env: EnvironmentLike, agent: Agent, rng: np.random.Generator, max_steps: int
+) -> Rollout:
+    """Play one episode and keep all of it, for a picture or an animation.
+
+    Parameters
+    ----------
+    env : str, Make, Task, gymnasium.Env or callable
+        See `rl_core.worlds.environments.open_world`.
+    agent : Agent
+    rng : numpy.random.Generator
+        Draws the environment's seed and the actions.
+    max_steps : int
+        Where to stop an episode that has not ended.
+
+    Returns
+    -------
+    Rollout
+
+    Raises
+    ------
+    ValueError, TypeError
+        If an argument is out of range, the environment unknown, or the policy does not fit it.
+
+    Examples
+    --------
+    >>> episode = rollout("MountainCar-v0", uniform(2, 3), np.random.default_rng(0), 100)
+    >>> episode.observations.shape, episode.terminated
+    ((101, 2), False)
+    """
+    instance("agent", agent, Agent, "an Agent")
+    max_steps, rng = integer("max_steps", max_steps, 1), generator("rng", rng)
+    environment_seed = int(rng.integers(2**32))
+    with closing(open_world(env)) as world:
+        check_fit(agent, world)
+        world.seed(environment_seed)
+        trajectory = Trajectory(world.n_observations, agent.policy.action_width)
+        actor = likelihood.make_actor(*agent)
+        steps, terminated = play_episode(world, actor, rng, max_steps, trajectory)
+    return Rollout(
+        trajectory.observations[: steps + 1],
+        trajectory.actions[:steps],
+        trajectory.rewards[:steps],
+        terminated,
+        environment_seed,
+    )
+
+
+def action_values(
+    weights: Mapping[str, NDArray[np.float32]], observations: NDArray[np.floating]
+) -> NDArray[np.float32]:
+    """Q(s, a) for many states.
+
+    Parameters
+    ----------
+    weights : mapping of str to array
+        Of one seed.
+    observations : array of shape (n, n_observations)
+
+    Returns
+    -------
+    float32 array of shape (n, n_actions)
+
+    Raises
+    ------
+    ValueError
+        If the weights are not those of one network, or the observations have another shape.
+
+    Examples
+    --------
+    >>> weights = {"layer0.weight": np.array([[1, 2, 3], [0, 0, 10]], np.float32)}
+    >>> action_values(weights, np.array([[1.0, 1.0]]))
+    array([[ 1.,  2., 13.]], dtype=float32)
+    """
+    sizes, parameters = networks.pack(weights)
+    return networks.output(
+        sizes, parameters, floats("observations", observations, (None, sizes[0]))
+    )
+
+
+def _policy_of(
+    config: ReinforceConfig, weights: Mapping[str, NDArray[np.float32]]
+) -> tuple[Policy, NDArray[np.float32]]:
+    """Put a policy and its parameter vector together again.
+
+    Parameters
+    ----------
+    config : ReinforceConfig
+        Of the run that made the weights.
+    weights : mapping of str to array
+        Of one seed, as `weights_of` gives them.
+
+    Returns
+    -------
+    policy : Policy
+    parameters : float32 array of shape (P,)
+
+    Raises
+    ------
+    ValueError
+        If `config` is no ReinforceConfig, the weights are not those of one network, or a Gaussian's
+        `log_sigma` is missing.
+
+    Examples
+    --------
+    >>> weights = {"layer0.weight": np.zeros((2, 3), np.float32)}
+    >>> policy, parameters = policy_of(ReinforceConfig(hidden=()), weights)
+    >>> policy.sizes, parameters.shape
+    (array([2, 3]), (9,))
+    """
+    instance("config", config, ReinforceConfig, "a ReinforceConfig")
+    instance("weights", weights, Mapping, "a mapping of names to arrays")
+    sizes, network = networks.pack(weights)
+    if not isinstance(config.policy, Gaussian):
+        return Policy(np.array(sizes), False, False, False, 1), network
+    given = "log_sigma" in weights
+    require(given, "weights", sorted(weights), "with 'log_sigma', since the policy is Gaussian")
+    log_sigma = weights["log_sigma"]
+    policy = Policy(
+        np.array(sizes),
+        True,
+        config.policy.mean == "weights",
+        config.policy.constant_feature,
+        len(log_sigma),
+    )
+    return policy, np.append(network, log_sigma)
+
+
+def mean_actions(
+    config: ReinforceConfig,
+    weights: Mapping[str, NDArray[np.float32]],
+    observations: NDArray[np.floating],
+) -> NDArray[np.float32]:
+    """mu(s) of a Gaussian policy: what it does on average, before any clipping.
+
+    Parameters
+    ----------
+    config : ReinforceConfig
+        Of the run that made the weights.
+    weights : mapping of str to array
+        Of one seed, as `weights_of` gives them.
+    observations : array of shape (n, n_observations)
+
+    Returns
+    -------
+    float32 array of shape (n, action_width)
+
+    Raises
+    ------
+    ValueError
+        If the policy is categorical.
+
+    Examples
+    --------
+    >>> config = ReinforceConfig(network=MLP(()), policy=Gaussian(mean="direct"))
+    >>> weights = {"layer0.weight": np.array([[1], [2]]), "log_sigma": np.zeros(1)}
+    >>> mean_actions(config, weights, np.array([[1.0, 10.0]]))
+    array([[21.]], dtype=float32)
+    """
+    require(isinstance(config.policy, Gaussian), "policy", config.policy, "Gaussian(...)")
+    policy, parameters = _policy_of(config, weights)
+    width = int(policy.sizes[0]) - policy.constant_feature
+    features = floats("observations", observations, (None, width)).astype(np.float32)
+    if policy.constant_feature:
+        features = np.column_stack([features, np.ones(len(features), np.float32)])
+    outputs = networks.output(
+        policy.sizes.tolist(), parameters[: parameters.size - policy.action_width], features
+    )
+    if not policy.weighted_features:
+        return outputs
+    per_feature = outputs.reshape(len(features), policy.action_width, features.shape[1])
+    means: NDArray[np.float32] = np.einsum("nkf,nf->nk", per_feature, features)
+    return means
+
+
+def state_grid(space: spaces.Box, points: int) -> NDArray[np.float32]:
+    """Lay an even grid over a space of observations, to look at a policy in every part of it.
+
+    Parameters
+    ----------
+    space : gymnasium.spaces.Box
+        Of n-dimensional observations; its bounds have to be finite.
+    points : int
+        Points along each dimension, at least 2; the bounds are among them.
+
+    Returns
+    -------
+    float32 array of shape (points ** n, n)
+        The last dimension runs fastest.
+
+    Raises
+    ------
+    ValueError
+        If the space is no such Box, a bound is not finite, or `points` is too small.
+
+    Examples
+    --------
+    >>> space = spaces.Box(np.array([0, -1], np.float32), np.array([1, 1], np.float32))
+    >>> state_grid(space, 2).tolist()
+    [[0.0, -1.0], [0.0, 1.0], [1.0, -1.0], [1.0, 1.0]]
+    """
+    valid = isinstance(space, spaces.Box) and len(space.shape) == 1
+    require(valid, "space", space, "a Box of one axis")
+    finite = bool(np.isfinite(space.low).all() and np.isfinite(space.high).all())
+    require(finite, "space", space, "a Box with finite bounds, because a grid has to end somewhere")
+    points = integer("points", points, 2)
+    axes = [np.linspace(*bounds, points) for bounds in zip(space.low, space.high, strict=True)]
+    grid = np.meshgrid(*axes, indexing="ij")
+    return np.stack(grid, axis=-1).reshape(-1, len(axes)).astype(np.float32)

@@ -1,9 +1,9 @@
-"""How a tabular learner picks its actions, while it learns and while it is evaluated.
+"""Exploration: how actions are picked while a learner learns, and how that changes.
 
-An exploration rule is a small frozen object. Its parameter is a number or a schedule: `Linear` or
-`Geometric` in the episodes. So is a step size, which may also shrink with use (`VisitDecay`).
-Every decision, whatever the rule, takes two uniforms u and v in [0, 1), so that the random stream
-of one rule lines up with that of another.
+A rule is a small frozen object. Its parameter, and a step size, is a number or a schedule, by the
+episode or by the environment step. The same rules and schedules serve tables and networks. Every
+decision takes two uniforms u and v in [0, 1), so that the random stream of one rule lines up with
+that of another.
 
 Epsilon is used as in the field: the probability of a uniformly random action. (The 2018 report
 calls the probability of exploiting epsilon, so its epsilon is 1 minus this one.)
@@ -11,62 +11,67 @@ calls the probability of exploiting epsilon, so its epsilon is 1 minus this one.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from numbers import Real
-from typing import ClassVar
+from functools import partial
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rl_core.compiled import compiled
-
-EPSILON_GREEDY, SOFTMAX, UNNORMALISED_SOFTMAX = range(3)
-"""The rules' numbers, by which `choose` knows them."""
+from rl_core.checks import fields, instance, integer, number, optional, positive, require
+from rl_core.kernels.choices import EPSILON_GREEDY, SOFTMAX, UNNORMALISED_SOFTMAX
 
 
 @dataclass(frozen=True)
 class Linear:
-    """A value that goes from `start` to `end` in equal steps.
+    """A value that goes from `start` to `end` in equal steps, and stays there.
 
-    In episode k = 1, 2, ... it is
-
-        start + (end - start) min(1, (k - 1) / episodes).
+    It is start + (end - start) min(1, t / duration), where t counts from 0 the episodes or the
+    environment steps of a seed, whichever the duration is given in.
 
     Attributes
     ----------
     start, end : float
-        The value in the first episode, and in episode `episodes + 1` and all later ones.
-    episodes : int
-        How many episodes the change takes, at least 1.
+        The first value and the last.
+    episodes, steps : int or None
+        The duration, at least 1: one of the two.
+
+    Raises
+    ------
+    TypeError, ValueError
+        An attribute is not as described.
 
     Examples
     --------
     >>> Linear(0.9, 0.1, episodes=4).values(6).round(3).tolist()
     [0.9, 0.7, 0.5, 0.3, 0.1, 0.1]
+    >>> Linear(1.0, 0.1, steps=10_000).steps
+    10000
     """
 
     start: float
     end: float
-    episodes: int
+    episodes: int | None = None
+    steps: int | None = None
 
     def __post_init__(self) -> None:
-        _check_schedule(self)
+        lengths = {"episodes": (optional, integer, 1), "steps": (optional, integer, 1)}
+        fields(self, start=(number,), end=(number,), **lengths)
+        given = (self.episodes, self.steps)
+        require(given.count(None) == 1, "episodes, steps", given, "one of them a number, one None")
 
     def values(self, episodes: int) -> NDArray[np.float64]:
         """Return the values of the first `episodes` episodes, float64 of shape (episodes,)."""
-        share = np.minimum(1.0, np.arange(episodes) / self.episodes)
-        return _between(self, (1.0 - share) * self.start + share * self.end)
+        duration = _by_the_episode(self)
+        share = np.minimum(1.0, np.arange(episodes) / duration)
+        return _between(self, duration, (1.0 - share) * self.start + share * self.end)
 
 
 @dataclass(frozen=True)
 class Geometric:
-    """A value that goes from `start` to `end` by equal factors.
+    """A value that goes from `start` to `end` by equal factors, and stays there.
 
-    In episode k = 1, 2, ... it is
-
-        start (end / start) ** min(1, (k - 1) / episodes).
+    In episode k = 1, 2, ... it is start (end / start) ** min(1, (k - 1) / episodes).
 
     Attributes
     ----------
@@ -74,6 +79,11 @@ class Geometric:
         As in `Linear`, and positive.
     episodes : int
         How many episodes the change takes, at least 1.
+
+    Raises
+    ------
+    TypeError, ValueError
+        An attribute is not as described.
 
     Examples
     --------
@@ -86,17 +96,95 @@ class Geometric:
     episodes: int
 
     def __post_init__(self) -> None:
-        _check_schedule(self)
-        for name in ("start", "end"):
-            check_number(name, getattr(self, name), lambda x: x > 0, "numbers above 0")
+        fields(self, start=(positive,), end=(positive,), episodes=(integer, 1))
 
     def values(self, episodes: int) -> NDArray[np.float64]:
         """Return the values of the first `episodes` episodes, float64 of shape (episodes,)."""
         share = np.minimum(1.0, np.arange(episodes) / self.episodes)
-        return _between(self, self.start * (self.end / self.start) ** share)
+        return _between(self, self.episodes, self.start * (self.end / self.start) ** share)
+
+
+@dataclass(frozen=True)
+class HalfWay:
+    """The 2018 program's rule for DQN: epsilon jumps half-way, by events and not by time.
+
+    It starts at `start`. After every episode that reached the goal it moves half-way to `end`, and
+    half-way from there on is the mid-point aimed at next. At each copy of the target network it
+    moves half-way to that mid-point. Before the first goal nothing changes.
+
+    Attributes
+    ----------
+    start, end : float
+        From 0 to 1. The program's exploitation probabilities 0.1 and 0.9 are 0.9 and 0.1 here.
+
+    Raises
+    ------
+    TypeError, ValueError
+        For any other value.
+
+    Examples
+    --------
+    >>> from rl_core.kernels.choices import AIM, VALUE, after_copy, after_goal
+    >>> state = schedule_state(HalfWay(0.9, 0.1))
+    >>> after_goal(state)
+    >>> round(float(state[VALUE]), 6), round(float(state[AIM]), 6)
+    (0.5, 0.3)
+    >>> after_copy(state)
+    >>> round(float(state[VALUE]), 6)
+    0.4
+    """
+
+    start: float = 0.9
+    end: float = 0.1
+
+    def __post_init__(self) -> None:
+        fields(self, start=(number, 0, 1), end=(number, 0, 1))
 
 
 Schedule = Linear | Geometric
+
+Epsilon = float | Linear | HalfWay
+"""Epsilon of a deep Q-network: constant, by the environment step, or by events."""
+
+
+def schedule_state(epsilon: Epsilon) -> NDArray[np.float64]:
+    """Return the state in which a schedule of epsilon begins; see `rl_core.kernels.choices`.
+
+    Returns
+    -------
+    float64 array of shape (6,)
+
+    Examples
+    --------
+    >>> float(schedule_state(0.1)[0])
+    0.1
+    """
+    if isinstance(epsilon, Linear):
+        entries = (epsilon.start, epsilon.start, epsilon.end, epsilon.steps, 0.0, epsilon.start)
+    elif isinstance(epsilon, HalfWay):
+        entries = (epsilon.start, epsilon.start, epsilon.end, 0, 0.5, epsilon.start)
+    else:
+        entries = (epsilon, epsilon, epsilon, 0, 0.0, epsilon)
+    return np.array(entries, np.float64)
+
+
+def check_epsilon(name: str, value: object) -> Epsilon:
+    """Return epsilon of a deep Q-network if it is one.
+
+    Examples
+    --------
+    >>> check_epsilon("epsilon", Linear(1, 0, episodes=5))
+    Traceback (most recent call last):
+    ValueError: epsilon must be a schedule by the environment step, got Linear(start=1.0, ...
+    """
+    if isinstance(value, HalfWay):
+        return value
+    if isinstance(value, Linear):
+        require(value.steps is not None, name, value, "a schedule by the environment step")
+        for end in ("start", "end"):
+            number(f"{name}.{end}", getattr(value, end), 0, 1)
+        return value
+    return number(name, value, 0, 1)
 
 
 @dataclass(frozen=True)
@@ -132,8 +220,7 @@ class VisitDecay:
     exponent: float = 0.6
 
     def __post_init__(self) -> None:
-        check_parameter("initial", self.initial, lambda x: 0 < x <= 1, "numbers in (0, 1]")
-        check_number("exponent", self.exponent, lambda x: 0 < x <= 1, "numbers in (0, 1]")
+        fields(self, initial=(check_step_size,), exponent=(partial(number, high=1, above=0),))
 
 
 @dataclass(frozen=True)
@@ -155,6 +242,7 @@ class EpsilonGreedy:
 
     Examples
     --------
+    >>> from rl_core.kernels.choices import choose
     >>> rule = EpsilonGreedy(epsilon=0.1)
     >>> q = np.array([0.0, 2.0, 2.0, 1.0])
     >>> [choose(rule.kind, rule.epsilon, q, u, v) for u, v in ((0.5, 0.2), (0.5, 0.9), (0.0, 0.9))]
@@ -165,7 +253,7 @@ class EpsilonGreedy:
     epsilon: float | Schedule = 0.1
 
     def __post_init__(self) -> None:
-        check_parameter("epsilon", self.epsilon, lambda x: 0 <= x <= 1, "numbers in [0, 1]")
+        fields(self, epsilon=(parameter_of, partial(number, low=0, high=1)))
 
     @property
     def parameter(self) -> float | Schedule:
@@ -192,6 +280,7 @@ class Softmax:
 
     Examples
     --------
+    >>> from rl_core.kernels.choices import choose
     >>> rule = Softmax(temperature=0.5)
     >>> q = np.array([0.0, 0.5 * np.log(3)])  # probabilities 1/4 and 3/4
     >>> [choose(rule.kind, rule.temperature, q, u, 0.0) for u in (0.24, 0.26)]
@@ -202,9 +291,7 @@ class Softmax:
     temperature: float | Schedule = 1.0
 
     def __post_init__(self) -> None:
-        check_parameter(
-            "temperature", self.temperature, lambda x: 0 < x < math.inf, "finite numbers above 0"
-        )
+        fields(self, temperature=(parameter_of, positive))
 
     @property
     def parameter(self) -> float | Schedule:
@@ -225,6 +312,7 @@ class UnnormalisedSoftmax:
 
     Examples
     --------
+    >>> from rl_core.kernels.choices import choose
     >>> kind = UnnormalisedSoftmax().kind
     >>> choose(kind, 1.0, np.zeros(4), 0.99, 0.0)
     0
@@ -245,7 +333,7 @@ ExplorationRule = EpsilonGreedy | Softmax | UnnormalisedSoftmax
 
 
 @dataclass(frozen=True)
-class Evaluation:
+class Trials:
     """When and how the greedy policy is tried out. The defaults are the course's.
 
     Attributes
@@ -266,8 +354,8 @@ class Evaluation:
 
     Examples
     --------
-    >>> Evaluation(every=100, epsilon=0)
-    Evaluation(every=100, episodes=10, max_steps=100, epsilon=0)
+    >>> Trials(every=100, epsilon=0)
+    Trials(every=100, episodes=10, max_steps=100, epsilon=0.0)
     """
 
     every: int = 50
@@ -276,9 +364,8 @@ class Evaluation:
     epsilon: float = 0.05
 
     def __post_init__(self) -> None:
-        for name in ("every", "episodes", "max_steps"):
-            check_integer(name, getattr(self, name), least=1)
-        check_number("epsilon", self.epsilon, lambda x: 0 <= x <= 1, "numbers in [0, 1]")
+        counts = dict.fromkeys(("every", "episodes", "max_steps"), (integer, 1))
+        fields(self, epsilon=(number, 0, 1), **counts)
 
 
 def values(parameter: float | Schedule, episodes: int) -> NDArray[np.float64]:
@@ -294,153 +381,40 @@ def values(parameter: float | Schedule, episodes: int) -> NDArray[np.float64]:
     return np.full(episodes, parameter, dtype=np.float64)
 
 
-def check_parameter(
-    name: str, value: object, allows: Callable[[float], bool], allowed: str
-) -> None:
-    """Raise unless `value` is a number that `allows` accepts, or a schedule between two such.
+def parameter_of(name: str, value: object, check: Any) -> Any:
+    """Return a number that a check accepts, or a schedule by the episode between two such.
 
     A schedule never leaves the range between its ends, so checking these is enough.
 
     Examples
     --------
-    >>> check_parameter("epsilon", Linear(0, 2, episodes=9), lambda x: 0 <= x <= 1, "0 to 1")
+    >>> parameter_of("temperature", Linear(1, 0, episodes=9), positive)
     Traceback (most recent call last):
-    ValueError: epsilon.end is 2; allowed are 0 to 1
+    ValueError: temperature.end must be a finite number above 0, got 0.0
     """
     if isinstance(value, Schedule):
-        check_number(f"{name}.start", value.start, allows, allowed)
-        check_number(f"{name}.end", value.end, allows, allowed)
-    else:
-        check_number(name, value, allows, allowed)
+        require(value.episodes is not None, name, value, "a schedule by the episode")
+        for end in ("start", "end"):
+            check(f"{name}.{end}", getattr(value, end))
+        return value
+    return check(name, value)
 
 
-def check_number(name: str, value: object, allows: Callable[[float], bool], allowed: str) -> None:
-    """Raise unless `value` is a number that `allows` accepts; NaN should fail its comparisons.
-
-    Examples
-    --------
-    >>> check_number("gamma", "0.9", lambda x: 0 <= x <= 1, "numbers in [0, 1]")
-    Traceback (most recent call last):
-    TypeError: gamma is '0.9'; allowed are numbers in [0, 1]
-    """
-    if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
-        raise TypeError(f"{name} is {value!r}; allowed are {allowed}")
-    if not allows(float(value)):
-        raise ValueError(f"{name} is {value}; allowed are {allowed}")
+def check_step_size(name: str, value: object) -> Any:
+    """Return a step size, above 0 and up to 1, or a schedule of it."""
+    return parameter_of(name, value, partial(number, high=1, above=0))
 
 
-def check_integer(name: str, value: object, least: int) -> None:
-    """Raise unless `value` is an integer from `least`.
-
-    Examples
-    --------
-    >>> check_integer("episodes", 0, least=1)
-    Traceback (most recent call last):
-    ValueError: episodes is 0; allowed are integers from 1
-    """
-    if isinstance(value, bool) or not isinstance(value, int | np.integer):
-        raise TypeError(f"{name} is {value!r}; allowed are integers from {least}")
-    if value < least:
-        raise ValueError(f"{name} is {value}; allowed are integers from {least}")
+def _by_the_episode(schedule: Linear) -> int:
+    """Return the episodes of a schedule."""
+    duration: int = instance(
+        "episodes", schedule.episodes, int, "an integer where values are asked for by the episode"
+    )
+    return duration
 
 
-def _between(schedule: Schedule, course: NDArray[np.float64]) -> NDArray[np.float64]:
+def _between(schedule: Schedule, episodes: int, course: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the course without what rounding adds: in range, and at its end from then on."""
-    course[schedule.episodes :] = schedule.end
+    course[episodes:] = schedule.end
     low, high = sorted((schedule.start, schedule.end))
     return np.minimum(high, np.maximum(low, course))
-
-
-def _check_schedule(schedule: Schedule) -> None:
-    for name in ("start", "end"):
-        check_number(name, getattr(schedule, name), math.isfinite, "finite numbers")
-    check_integer("episodes", schedule.episodes, least=1)
-
-
-@compiled
-def choose(kind: int, parameter: float, q: NDArray[np.float64], u: float, v: float) -> int:
-    """Return the action that a rule takes; a pure function of the values and two uniforms.
-
-    Parameters
-    ----------
-    kind : int
-        The rule's `kind`.
-    parameter : float
-        Epsilon or the temperature in this episode.
-    q : ndarray of float64, shape (A,)
-        The action values of the state.
-    u, v : float
-        Two uniforms in [0, 1); see the rules for what each decides.
-
-    Returns
-    -------
-    int
-        The action, from 0 to A - 1.
-
-    Examples
-    --------
-    >>> choose(EPSILON_GREEDY, 0.1, np.array([0.0, 2.0, 1.0]), u=0.5, v=0.9)
-    1
-    """
-    if kind == SOFTMAX:
-        return _softmax_action(q, parameter, u)
-    if kind == UNNORMALISED_SOFTMAX:
-        return _unnormalised_softmax_action(q, u)
-    if u < parameter:
-        return int(v * len(q))
-    return _greedy_action(q, v)
-
-
-@compiled
-def _greedy_action(q: NDArray[np.float64], v: float) -> int:
-    """Draw one of the actions with the largest value, uniformly."""
-    best, ties = q[0], 1
-    for a in range(1, len(q)):
-        if q[a] > best:
-            best, ties = q[a], 1
-        elif q[a] == best:
-            ties += 1
-    skip = int(v * ties)
-    for a in range(len(q)):
-        if q[a] == best:
-            if skip == 0:
-                return a
-            skip -= 1
-    return 0  # only if a value is NaN
-
-
-@compiled
-def _softmax_action(q: NDArray[np.float64], temperature: float, u: float) -> int:
-    """Draw by the cumulative weights exp((q - max q) / T), which cannot overflow."""
-    best = q[0]
-    for a in range(1, len(q)):
-        best = max(best, q[a])
-    total = 0.0
-    for a in range(len(q)):
-        total += math.exp((q[a] - best) / temperature)
-    threshold, cumulative = u * total, 0.0
-    for a in range(len(q)):
-        cumulative += math.exp((q[a] - best) / temperature)
-        if cumulative > threshold:
-            return a
-    return len(q) - 1  # only if u * total is rounded up to the total
-
-
-@compiled
-def _unnormalised_softmax_action(q: NDArray[np.float64], u: float) -> int:
-    """Draw by the cumulative weights exp(q) / sum(q), whatever they sum to."""
-    total = 0.0
-    for a in range(len(q)):
-        total += q[a]
-    cumulative = 0.0
-    for a in range(len(q)):
-        cumulative += math.exp(q[a]) / total
-        if cumulative > u:
-            return a
-    return 0
-
-
-@compiled
-def step_size(initial: float, exponent: float, n: int) -> float:
-    """Return alpha for the n-th update of an entry; the exponent is 0 where it does not decay."""
-    return initial if exponent == 0.0 else initial / n**exponent

@@ -7,7 +7,6 @@ is a Gymnasium environment, `Maze.model` its exact model; `random_maze` draws ma
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from numbers import Integral, Real
 from typing import Any
 
 import gymnasium as gym
@@ -17,10 +16,11 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from rl_core.compiled import compiled
-from rl_core.maze_layout import COURSE_LAYOUT, MAX_FLAGS, find, random_layout, read_layout
-from rl_core.maze_picture import draw_maze
+from rl_core import checks
+from rl_core.kernels.compiled import compiled
 from rl_core.mdp import MDP, OwnModel
+from rl_core.worlds.maze_layout import COURSE_LAYOUT, MAX_FLAGS, find, random_layout, read_layout
+from rl_core.worlds.maze_picture import draw_maze
 
 __all__ = ["ACTIONS", "CLOCKWISE", "COURSE_LAYOUT", "MAX_FLAGS", "MOVES", "Maze", "random_maze"]
 
@@ -108,13 +108,9 @@ class Maze(OwnModel, gym.Env[int, int]):
         render_mode: str | None = None,
     ) -> None:
         letters = read_layout(layout)
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(
-                f"render_mode must be None or one of {self.metadata['render_modes']}, "
-                f"not {render_mode!r}"
-            )
+        checks.optional("render_mode", render_mode, checks.one_of, self.metadata["render_modes"])
         self.layout = "".join(f"{row}\n" for row in _joined(letters))
-        self.slip = _checked_slip(slip)
+        self.slip = checks.number("slip", slip, 0, 1)
         self.render_mode = render_mode
         self.walls: NDArray[np.bool_] = letters == "W"
         self.cells: NDArray[np.int32] = np.argwhere(~self.walls.T)[:, ::-1].astype(np.int32)
@@ -173,8 +169,8 @@ class Maze(OwnModel, gym.Env[int, int]):
         >>> env.reset()[0], env.step(3)[:3], env.step(3)[:3]  # right, and right again
         (0, (3, 0.0, False), (5, 1.0, True))
         """
-        if isinstance(action, bool) or not self.action_space.contains(action):
-            raise ValueError(f"action must be 0, 1, 2 or 3, not {action!r}")
+        known = not isinstance(action, bool) and self.action_space.contains(action)
+        checks.require(known, "action", action, "0, 1, 2 or 3")
         if self._state is None:
             raise ResetNeeded("call reset() before step()")
         outcome = int(np.argmax(self._cumulative > self.np_random.random()))
@@ -256,8 +252,8 @@ class Maze(OwnModel, gym.Env[int, int]):
 
         Raises
         ------
-        ValueError
-            If the cell is a wall or off the grid, or a flag unknown.
+        ValueError, TypeError
+            If the cell is a wall or off the grid, a flag unknown, or a type wrong.
 
         Examples
         --------
@@ -265,16 +261,17 @@ class Maze(OwnModel, gym.Env[int, int]):
         111
         """
         n_rows, n_columns = self.walls.shape
-        whole = _is_whole(row) and _is_whole(column)
-        inside = whole and 0 <= row < n_rows and 0 <= column < n_columns
-        if not inside or self.walls[row, column]:
-            raise ValueError(f"row {row}, column {column} is not a free cell of the maze")
+        at = (
+            checks.integer("row", row, 0, n_rows - 1),
+            checks.integer("column", column, 0, n_columns - 1),
+        )
+        checks.require(not self.walls[at], "row, column", at, "a free cell")
         mask = 0
-        for flag in flags:
-            if flag not in self._bits:
-                raise ValueError(f"flags must be among {list(self._bits)}, not {flag!r}")
+        for flag in checks.instance("flags", flags, Iterable, "letters of flags"):
+            known = isinstance(flag, str) and flag in self._bits
+            checks.require(known, "flags", flag, f"among {list(self._bits)}")
             mask |= self._bits[flag]
-        cell = int(self._cell_number[row, column])
+        cell = int(self._cell_number[at])
         return len(self._masks) * cell + int(self._set_number[mask])
 
     def locate(self, state: int) -> tuple[int, int, str]:
@@ -282,7 +279,7 @@ class Maze(OwnModel, gym.Env[int, int]):
 
         Raises
         ------
-        ValueError
+        ValueError, TypeError
             If there is no such state.
 
         Examples
@@ -290,10 +287,8 @@ class Maze(OwnModel, gym.Env[int, int]):
         >>> Maze().locate(111)
         (1, 4, 'ABC')
         """
-        if not _is_whole(state) or not 0 <= state < len(self.cells) * len(self._masks):
-            limit = len(self.cells) * len(self._masks) - 1
-            raise ValueError(f"state must be an integer in 0..{limit}, it is {state!r}")
-        cell, flag_set = divmod(int(state), len(self._masks))
+        state = checks.integer("state", state, 0, len(self.cells) * len(self._masks) - 1)
+        cell, flag_set = divmod(state, len(self._masks))
         row, column = self.cells[cell].tolist()
         return row, column, self._flags_held(flag_set)
 
@@ -301,7 +296,7 @@ class Maze(OwnModel, gym.Env[int, int]):
         """Return the current state as text or picture, according to `render_mode`.
 
         The text is the layout with the agent as `@` and flags held as `f`, and a line naming them.
-        The picture is that of `rl_core.maze_picture.draw_maze`.
+        The picture is that of `rl_core.worlds.maze_picture.draw_maze`.
 
         Raises
         ------
@@ -356,10 +351,9 @@ class Maze(OwnModel, gym.Env[int, int]):
         sets of one size is falling order of the masks.
         """
         n_flags = len(self.flag_cells)
-        if len(self.cells) << n_flags >= 2**31:
-            raise ValueError(
-                f"layout has {len(self.cells)} free cells and {n_flags} flags: 2**31 states or more"
-            )
+        found = f"{len(self.cells)} free cells and {n_flags} flags"
+        few = len(self.cells) << n_flags < 2**31
+        checks.require(few, "layout", found, "of fewer than 2**31 states")
         self._cell_number = np.full(self.walls.shape, -1, dtype=np.int32)
         self._cell_number[tuple(self.cells.T)] = np.arange(len(self.cells), dtype=np.int32)
         self._bits = {flag: 1 << (n_flags - 1 - i) for i, flag in enumerate(self.flag_cells)}
@@ -402,7 +396,7 @@ def random_maze(
 ) -> Maze:
     """Draw a random maze whose goal and flags can all be reached from the start.
 
-    See `rl_core.maze_layout.random_layout` for how it is drawn.
+    See `rl_core.worlds.maze_layout.random_layout` for how it is drawn.
 
     Parameters
     ----------
@@ -434,20 +428,6 @@ def random_maze(
     Discrete(72)
     """
     return Maze(_joined(random_layout(rows, columns, flags, wall_fraction, rng)), slip=slip)
-
-
-def _is_whole(number: object) -> bool:
-    """Say whether it is an integer and no bool, which Python would take for one."""
-    return isinstance(number, Integral) and not isinstance(number, bool)
-
-
-def _checked_slip(slip: object) -> float:
-    if isinstance(slip, bool) or not isinstance(slip, Real):
-        raise TypeError(f"slip must be a number, not {type(slip).__name__}")
-    value = float(slip)
-    if not 0 <= value <= 1:
-        raise ValueError(f"slip must lie in [0, 1], it is {value}")
-    return value
 
 
 def _joined(letters: NDArray[np.str_]) -> list[str]:

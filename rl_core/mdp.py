@@ -11,10 +11,25 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium import wrappers
 from numpy.typing import ArrayLike, NDArray
 
-from rl_core.compiled import compiled
-from rl_core.toy_text import SUM_TOLERANCE, check_distribution, read_table, start_arrays
+from rl_core import checks
+from rl_core.kernels.bounds import SUM_TOLERANCE
+from rl_core.kernels.compiled import compiled
+from rl_core.worlds.tables import read_table, start_arrays
+
+TRANSPARENT = (
+    wrappers.Autoreset,
+    wrappers.HumanRendering,
+    wrappers.OrderEnforcing,
+    wrappers.PassiveEnvChecker,
+    wrappers.RecordEpisodeStatistics,
+    wrappers.RecordVideo,
+    wrappers.RenderCollection,
+    wrappers.TimeLimit,
+)
+"""Wrappers that leave states, actions and rewards as they are."""
 
 
 class OwnModel:
@@ -59,9 +74,11 @@ class MDP:
     Raises
     ------
     ValueError
-        If an array has the wrong shape or type, probabilities lie outside [0, 1] or do not sum to 1
+        If an array has the wrong shape, probabilities lie outside [0, 1] or do not sum to 1
         (within 1e-9), a state is out of range, a reward is not finite, or a terminal state does not
         absorb. The message names the argument, the state, the action and the value.
+    TypeError
+        If an array is not of integers, numbers or bools, as said above.
 
     Notes
     -----
@@ -147,6 +164,23 @@ class MDP:
         start = self.start_state[self.start_probability > 0]
         return _reachable(self.successor, self.probability, start)
 
+    def following(self, policy: ArrayLike) -> MDP:
+        """Return the model with one action: that of a policy, an array of an action a state.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If `policy` holds no integers, has another shape, or an action is out of range.
+
+        Examples
+        --------
+        >>> MDP.from_env("FrozenLake-v1").following(np.full(16, 2)).successor.shape
+        (16, 1, 3)
+        """
+        taken = np.arange(self.n_states), checked_policy("policy", policy, self)
+        names = "successor", "probability", "reward"
+        return replace(self, **{name: getattr(self, name)[taken][:, None] for name in names})
+
     @classmethod
     def from_env(
         cls, env: str | gym.Env[Any, Any], start_distribution: ArrayLike | None = None
@@ -167,7 +201,8 @@ class MDP:
         Parameters
         ----------
         env : str or gymnasium.Env
-            An id for `gymnasium.make`, or an environment, wrapped or not.
+            An id for `gymnasium.make`, or an environment; of wrappers it may have only such as
+            leave states, actions and rewards alone (`TRANSPARENT`): time limits, records, pictures.
         start_distribution : array of float, shape (S,), optional
             The probability that an episode starts in each state. By default the environment's
             `initial_state_distrib`, or all on its `start_state_index`.
@@ -180,11 +215,12 @@ class MDP:
         Raises
         ------
         TypeError
-            If `env` is neither an id nor an environment.
+            If `env` is neither an id nor an environment, or `start_distribution` no numbers.
         ValueError
-            If Gymnasium does not know the id, the environment has no table, the table is malformed
-            (then the message names the state, the action and what is there), the start distribution
-            is missing, no numbers or of the wrong shape, or the model's own checks fail.
+            If Gymnasium cannot make the environment (the message says why), a wrapper may change
+            states, actions or rewards, there is no table, the table is malformed (then the message
+            names the state, the action and what is there), the start distribution is missing or of
+            the wrong shape, or the model's own checks fail.
 
         Examples
         --------
@@ -195,40 +231,35 @@ class MDP:
         if isinstance(env, str):
             try:
                 made = gym.make(env)
-            except gym.error.Error as error:
+            except Exception as error:  # whatever the environment's own code raises
                 raise ValueError(
-                    f"env is {env!r}; allowed are ids that Gymnasium knows ({error})"
+                    f"env must be an id that Gymnasium can make, got {env!r}: {error}"
                 ) from error
             with made:
                 return cls.from_env(made, start_distribution)
-        if not isinstance(env, gym.Env):
-            raise TypeError(f"env must be an id or a gymnasium.Env, not {type(env).__name__}")
-        base = env.unwrapped
+        base = _unwrapped(checks.instance("env", env, gym.Env, "an id or a gymnasium.Env"))
         if not isinstance(base, OwnModel):
             return cls(**read_table(base, start_distribution))
         model = base.model()
         if start_distribution is None:
             return model
-        start = check_distribution(start_distribution, model.n_states)
-        return replace(model, **start_arrays(start))
+        return replace(model, **start_arrays(start_distribution, model.n_states))
 
     def _check_shapes(self) -> None:
         shape = self.successor.shape
-        if 0 in shape:
-            raise ValueError(f"successor must have no empty axis, its shape is {shape}")
+        checks.require(0 not in shape, "successor", shape, "of a shape without an empty axis")
         for name in ("probability", "reward"):
-            if getattr(self, name).shape != shape:
-                raise ValueError(
-                    f"{name} must have the shape of successor, {shape}, "
-                    f"not {getattr(self, name).shape}"
-                )
-        if self.terminal.shape != shape[:1]:
-            raise ValueError(f"terminal must have shape {shape[:1]}, not {self.terminal.shape}")
-        if not 0 < len(self.start_state) == len(self.start_probability):
-            raise ValueError(
-                "start_state and start_probability must have the same length, at least 1, "
-                f"not {len(self.start_state)} and {len(self.start_probability)}"
-            )
+            found = getattr(self, name).shape
+            checks.require(found == shape, name, found, f"of the shape of successor, {shape}")
+        found = self.terminal.shape
+        checks.require(found == shape[:1], "terminal", found, f"of shape {shape[:1]}")
+        lengths = len(self.start_state), len(self.start_probability)
+        checks.require(
+            0 < lengths[0] == lengths[1],
+            "start_state and start_probability",
+            f"{lengths[0]} and {lengths[1]}",
+            "of the same length, at least 1",
+        )
 
     def _check_transitions(self) -> None:
         """Raise on the first state, action and slot that breaks a rule."""
@@ -237,61 +268,87 @@ class MDP:
         )
         if fault == _SOUND:
             return
-        where = f"at state {s}, action {a}"
-        slot = f"{where}, slot {k}"
-        if fault == _BAD_PROBABILITY:
-            message = f"probability must lie in [0, 1], {slot} it is {self.probability[s, a, k]}"
-        elif fault == _BAD_SUM:
-            message = (
-                f"probability must sum to 1, {where} the sum is {self.probability[s, a].sum()}"
+        if fault == _BAD_SUM:
+            total = self.probability[s, a].sum()
+            raise ValueError(
+                f"probability must sum to 1, at state {s}, action {a} the sum is {total}"
             )
-        elif fault == _BAD_SUCCESSOR:
-            message = (
-                f"successor must lie in 0..{self.n_states - 1}, "
-                f"{slot} it is {self.successor[s, a, k]}"
-            )
-        elif fault == _BAD_REWARD:
-            message = f"reward must be finite, {slot} it is {self.reward[s, a, k]}"
-        elif fault == _LEAVES_TERMINAL:
-            message = (
-                "successor of a terminal state must be the state itself, "
-                f"{slot} it is {self.successor[s, a, k]}"
-            )
-        else:
-            message = f"reward of a terminal state must be 0, {slot} it is {self.reward[s, a, k]}"
-        raise ValueError(message)
+        name, allowed = {
+            _BAD_PROBABILITY: ("probability", "must be from 0 to 1"),
+            _BAD_SUCCESSOR: ("successor", f"must be from 0 to {self.n_states - 1}"),
+            _BAD_REWARD: ("reward", "must be finite"),
+            _LEAVES_TERMINAL: ("successor", "of a terminal state must be the state itself"),
+            _PAYS_IN_TERMINAL: ("reward", "of a terminal state must be 0"),
+        }[fault]
+        value = getattr(self, name)[s, a, k]
+        raise ValueError(f"{name} {allowed}, at state {s}, action {a}, slot {k} it is {value}")
 
     def _check_start(self) -> None:
-        for i, state in enumerate(self.start_state.tolist()):
-            if not 0 <= state < self.n_states:
-                raise ValueError(
-                    f"start_state must lie in 0..{self.n_states - 1}, entry {i} is {state}"
-                )
-        for i, probability in enumerate(self.start_probability.tolist()):
-            if not 0 <= probability <= 1:
-                raise ValueError(
-                    f"start_probability must lie in [0, 1], entry {i} is {probability}"
-                )
+        for name, most in (("start_state", self.n_states - 1), ("start_probability", 1)):
+            values = getattr(self, name)
+            wrong = np.flatnonzero(~((values >= 0) & (values <= most)))  # catches NaN too
+            if len(wrong):
+                found = f"entry {wrong[0]} is {values[wrong[0]]}"
+                raise ValueError(f"{name} must be from 0 to {most}, {found}")
         total = float(self.start_probability.sum())
         if abs(total - 1) > SUM_TOLERANCE:
-            raise ValueError(f"start_probability must sum to 1, the sum is {total!r}")
+            raise ValueError(f"start_probability must sum to 1, the sum is {total}")
+
+
+def checked_policy(name: str, policy: ArrayLike, mdp: MDP) -> NDArray[np.integer]:
+    """Return `policy` as an array; raise unless it has one of the actions for every state.
+
+    Examples
+    --------
+    >>> checked_policy("policy", [4] * 16, MDP.from_env("FrozenLake-v1"))
+    Traceback (most recent call last):
+    ValueError: policy must be an array of integers from 0 to 3, in state 0 it is 4
+    """
+    checks.floats(name, policy, (mdp.n_states,))
+    actions = np.asarray(policy)
+    allowed = f"an array of integers from 0 to {mdp.n_actions - 1}"
+    if actions.dtype.kind not in "iu":
+        raise TypeError(f"{name} must be {allowed}, got {actions.dtype}")
+    wrong = np.flatnonzero((actions < 0) | (actions >= mdp.n_actions))
+    if len(wrong):
+        found = f"in state {wrong[0]} it is {actions[wrong[0]]}"
+        raise ValueError(f"{name} must be {allowed}, {found}")
+    return actions
+
+
+def _unwrapped(env: gym.Env[Any, Any]) -> gym.Env[Any, Any]:
+    """Return the environment inside wrappers, none of which may change what the model says."""
+    while isinstance(env, gym.Wrapper):
+        if type(env) not in TRANSPARENT:
+            raise ValueError(
+                "env must be without wrappers that may change states, actions or rewards, "
+                f"got {type(env).__name__} (in {env})"
+            )
+        env = env.env
+    return env
 
 
 def _as_array(name: str, values: ArrayLike, dtype: type[np.generic], ndim: int) -> NDArray[Any]:
     """Return a read-only view of `values`; convert its type only if no value changes by it."""
+    kinds, what = {
+        np.int32: ("iu", "integers"),
+        np.float64: ("iuf", "numbers"),
+        np.bool_: ("b", "bools"),
+    }[dtype]
+    allowed = f"an array of {what} with {ndim} axes"
     try:
         given = np.asarray(values)
-    except ValueError as error:  # ragged nesting
-        raise ValueError(f"{name} must be an array with {ndim} axes: {error}") from error
-    if given.ndim != ndim:
-        raise ValueError(f"{name} must have {ndim} axes, its shape is {given.shape}")
-    kinds = {np.int32: "iu", np.float64: "iuf", np.bool_: "b"}[dtype]
+    except ValueError:
+        raise ValueError(f"{name} must be {allowed}, got ragged lists") from None
+    if given.dtype == np.object_ and dtype is np.float64:  # fractions
+        given = checks.floats(name, values, (None,) * ndim)
+    checks.require(given.ndim == ndim, name, values, allowed)
     if given.size and given.dtype.kind not in kinds:  # an empty list has no type of its own
-        raise ValueError(f"{name} must be of type {dtype.__name__}, not {given.dtype}")
+        raise TypeError(f"{name} must be {allowed}, got {given.dtype}")
     array = given.astype(dtype, copy=False)
     if dtype is np.int32 and array is not given and not np.array_equal(array, given):
         wrong = int(given[array != given][0])
-        raise ValueError(f"{name} must hold state indices below 2**31, it holds {wrong}")
+        checks.require(False, name, wrong, "states, integers from 0 below 2**31")
     view = array.view()
     view.setflags(write=False)
     return view

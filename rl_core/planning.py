@@ -18,27 +18,23 @@ right-hand side for one state and action.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_matrix, identity
 from scipy.sparse.linalg import splu
+from tqdm import tqdm
 
-from rl_core import plan, sweeps
-from rl_core.mdp import MDP
-from rl_core.plan import Plan, check_model, check_positive, greedy_policy, optimal_actions
-from rl_core.sweeps import TIE, Transitions
-
-__all__ = [
-    "Plan",
-    "backup",
-    "greedy_policy",
-    "optimal_actions",
-    "policy_evaluation",
-    "policy_iteration",
-    "q_value_iteration",
-    "value_iteration",
-]
+from rl_core import checks
+from rl_core.kernels import bounds, sweeps
+from rl_core.kernels.bounds import error_bound, rounding_error, sweeps_allowed
+from rl_core.kernels.sweeps import TIE, Transitions
+from rl_core.mdp import MDP, checked_policy
 
 DIRECT_LIMIT = 20_000
 """The most states for which equations are solved directly: the factors fill in, to gigabytes."""
@@ -53,6 +49,38 @@ one: it carries values through where the estimated order is the wrong way round.
 MODIFIED_ROUNDS = 200
 """After so many rounds the evaluation sweeps, there for speed, are left out: improvement sweeps
 alone contract from any values, so that convergence is certain."""
+
+PATIENCE = 2.0
+"""Seconds before progress is shown."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What planning found.
+
+    Attributes
+    ----------
+    Q : ndarray of float64, shape (S, A)
+        Action values, in units of return. Rows of terminal states are 0.
+    V : ndarray of float64, shape (S,)
+        State values, V(s) = max_a Q(s, a).
+    policy : ndarray of int8 (int32 above 128 actions), shape (S,)
+        The greedy policy, `greedy_policy(Q)`: of tied actions the lowest.
+    table : pandas.DataFrame
+        One row a sweep (of `policy_iteration`: a round), with at least the columns
+
+        - `sweep`: its number, from 1;
+        - `residual`, `norm`: largest absolute value and Frobenius norm of the change it made (to Q
+          in `q_value_iteration` and `policy_iteration`, to V in `value_iteration`);
+        - `policy_changes`: states whose greedy action changed;
+        - `backups`: state-action backups done so far, those of terminal states included;
+        - `bound`: no entry of Q or V is further than this from Q* or V* (NaN: not known).
+    """
+
+    Q: NDArray[np.float64]
+    V: NDArray[np.float64]
+    policy: NDArray[np.signedinteger]
+    table: pd.DataFrame
 
 
 def q_value_iteration(
@@ -73,7 +101,7 @@ def q_value_iteration(
     mdp : MDP
         The model.
     gamma : float
-        Discount, in [0, 1).
+        Discount, in [0, 1 - 1e-8].
     threshold : float
         Where to stop, above 0, in units of return.
     max_sweeps : int, optional
@@ -91,7 +119,7 @@ def q_value_iteration(
     ValueError, TypeError
         If an argument is out of range or has the wrong type.
     ArithmeticError
-        If rounding keeps the changes above `threshold`.
+        If rounding, or a γ close to 1, keeps the changes above `threshold`.
 
     Notes
     -----
@@ -103,27 +131,27 @@ def q_value_iteration(
     >>> q_value_iteration(lake, gamma=0.99, threshold=1e-9).Q[14].round(3).tolist()
     [0.733, 0.863, 0.821, 0.781]
     """
-    check_model(mdp, gamma)
-    check_positive("threshold", threshold)
-    if max_sweeps is not None:
-        plan.check_count("max_sweeps", max_sweeps)
-    limit: float = math.inf if max_sweeps is None else max_sweeps
-    transitions, reward = sweeps.arrays(mdp)
-    Q, V, policy = plan.blank(mdp)
-    largest, norm = float(np.abs(reward).max()), math.inf
-    with plan.recording("Q-value iteration", progress) as record:
+    gamma, transitions, reward = _opened(mdp, gamma)
+    threshold = checks.number("threshold", threshold, above=0)
+    limit = checks.optional("max_sweeps", max_sweeps, checks.integer, 1) or math.inf
+    Q, V, policy = _blank(mdp)
+    largest, norm = _largest(reward, gamma), math.inf
+    with _recording("Q-value iteration", progress) as record:
         while norm >= threshold and len(record.rows) < limit:
             residual, squares = sweeps.lookahead(transitions, reward, gamma, V, Q)
             _, _, changes = sweeps.greedy(Q, V, policy)
             norm = math.sqrt(squares)
-            magnitude = max(largest, float(np.abs(V).max()) + residual)
-            bound = plan.error_bound(residual, gamma, plan.rounding_error(mdp, magnitude))
+            magnitude = max(largest, _magnitude(V) + residual)
+            bound = error_bound(residual, gamma, rounding_error(mdp.n_successors, magnitude))
             record.add(residual, norm, changes, Q.size, bound)
             if len(record.rows) == 1 and max_sweeps is None:
-                limit = 1 + plan.sweeps_needed(norm * math.sqrt(Q.size), threshold, gamma)
+                limit = 1 + sweeps_allowed(norm * math.sqrt(Q.size), threshold, gamma)
     if norm >= threshold and max_sweeps is None:
-        found = f"after {len(record.rows)} sweeps the norm of the change is {norm:.1e}"
-        raise ArithmeticError(f"threshold {threshold} is below what rounding allows: {found}")
+        raise ArithmeticError(
+            f"threshold {threshold} is below what rounding and gamma {gamma} allow: after "
+            f"{len(record.rows)} sweeps the norm of the change is {norm:.1e}; ask for "
+            f"{2 * norm:.0e} or more"
+        )
     return Plan(Q, V, policy, record.table())
 
 
@@ -132,7 +160,7 @@ def value_iteration(
 ) -> Plan:
     """Find Q* and V* to within `tolerance`, with the states swept in the order values flow in.
 
-    What makes it fast, beside compiled code (`rl_core.sweeps`):
+    What makes it fast, beside compiled code (`rl_core.kernels.sweeps`):
 
     - *Order.* States are swept by falling value, as estimated beforehand by a search
       backwards from the rewards; a sweep works in place and so carries values all the way.
@@ -147,7 +175,7 @@ def value_iteration(
     mdp : MDP
         The model.
     gamma : float
-        Discount, in [0, 1).
+        Discount, in [0, 1 - 1e-8].
     tolerance : float
         Largest error allowed in any entry of Q and V, above 0, in units of return.
     progress : bool
@@ -163,16 +191,14 @@ def value_iteration(
     ValueError, TypeError
         If an argument is out of range or has the wrong type.
     ArithmeticError
-        If float64 cannot guarantee `tolerance` for this model; the message says what it can.
+        If rounding, or a γ close to 1, keeps the bound above `tolerance`; the message says what
+        can be had.
 
     Notes
     -----
-    *The bound.* A sweep V → V' with contraction factor γ leaves |V' - V*| ≤ γ / (1 - γ) |V' - V|,
-    in the largest entry. In place sweeps have the same factor, and staying solved for even a
-    smaller one, γ (1 - l) / (1 - γ l) for an action that stays with probability l. Two things are
-    added: rows of probabilities may add up to 1 + 1e-9, so the factor is γ (1 + 1e-9); and each
-    backup is off by rounding, at most 2 (K + 1) ε max(|r|, |V|), with ε = 2⁻⁵². So the bound is
-    (γ |V' - V| + rounding) / (1 - γ).
+    *The bound* is (γ |V' - V| + rounding) / (1 - γ) after a sweep V → V', in the largest entry; see
+    `rl_core.kernels.bounds`. Sweeps in place contract by γ as others do, and staying solved for by
+    even less, γ (1 - l) / (1 - γ l) for an action that stays with probability l.
 
     *Memory.* With 4 actions, 2 successors and probabilities shared by all states: 97 bytes a state
     for the model and at most 90 for planning; 8 A K more if states have their own probabilities.
@@ -189,14 +215,14 @@ def value_iteration(
     >>> round(plan.V[0], 6), bool(plan.table["bound"].iloc[-1] <= 1e-9)
     (np.float64(0.542026), True)
     """
-    check_model(mdp, gamma)
-    check_positive("tolerance", tolerance)
-    transitions, reward = sweeps.arrays(mdp)
-    Q, V, policy = plan.blank(mdp)
+    gamma, transitions, reward = _opened(mdp, gamma)
+    tolerance = checks.number("tolerance", tolerance, above=0)
+    Q, V, policy = _blank(mdp)
     order = np.arange(mdp.n_states, dtype=np.int32)
     magnitude = sweeps.expected_rewards(transitions, reward, order, Q)  # Q is r(s, a) for now
-    bound = plan.error_bound(magnitude, gamma, plan.rounding_error(mdp, magnitude))
-    with plan.recording("value iteration", progress, "kind") as record:
+    bounds.check_returns("mdp", magnitude, gamma)
+    bound = error_bound(magnitude, gamma, rounding_error(mdp.n_successors, magnitude))
+    with _recording("value iteration", progress) as record:
         if bound > tolerance:  # else V = 0 will do
             ordered = sweeps.in_order(transitions, Q, mdp.terminal, gamma, order, V)
             sweeps.expected_rewards(transitions, reward, order, Q)
@@ -205,11 +231,11 @@ def value_iteration(
             V[order], policy[order] = V.copy(), policy.copy()
         sweeps.lookahead(transitions, reward, gamma, V, Q)
         residual, squares, changes = sweeps.greedy(Q, V, policy)
-        magnitude = max(magnitude, float(np.abs(V).max()) + residual)
-        rounding = plan.rounding_error(mdp, magnitude)
-        bound = min(bound, plan.error_bound(residual, gamma, rounding))
+        magnitude = max(magnitude, _magnitude(V) + residual)
+        rounding = rounding_error(mdp.n_successors, magnitude)
+        bound = min(bound, error_bound(residual, gamma, rounding))
         record.add(residual, math.sqrt(squares), changes, Q.size, bound, "check")
-    return Plan(Q, V, policy, record.table())
+    return Plan(Q, V, policy, record.table("kind"))
 
 
 def _sweep(
@@ -221,7 +247,7 @@ def _sweep(
     V: NDArray[np.float64],
     policy: NDArray[np.signedinteger],
     magnitude: float,
-    record: plan.Record,
+    record: _Record,
 ) -> float:
     """Sweep V in place until its error bound is within the tolerance, and return the bound."""
     chosen = ordered.successor[:, 0].copy()  # the successors of the policy, which is action 0
@@ -230,21 +256,21 @@ def _sweep(
     while True:
         rounds += 1
         residual, squares, changes, largest = sweeps.improvement_sweep(*arrays, backward)
-        rounding = plan.rounding_error(mdp, max(magnitude, largest + residual))
-        bound = plan.error_bound(residual, gamma, rounding)
+        rounding = rounding_error(mdp.n_successors, max(magnitude, largest + residual))
+        bound = error_bound(residual, gamma, rounding)
         record.add(residual, math.sqrt(squares), changes, r.size, bound, "improvement")
         if bound <= tolerance:
             return bound
         if residual <= rounding or rounds > limit:
-            attainable = 2 * plan.error_bound(rounding, gamma, rounding)
+            attainable = 2 * error_bound(max(residual, rounding), gamma, rounding)
             raise ArithmeticError(
                 f"tolerance {tolerance} is below what float64 can guarantee for this model and "
-                f"gamma {gamma}; ask for {attainable:.0e} or more"
+                f"gamma {gamma}, or too many sweeps away; ask for {attainable:.0e} or more"
             )
         backward, before = not backward and residual > SLOW * before, residual
         if rounds == MODIFIED_ROUNDS:
             error = residual / (1 - gamma)
-            limit = rounds + plan.sweeps_needed(2 * error, (1 - gamma) * tolerance / 2, gamma)
+            limit = rounds + sweeps_allowed(2 * error, (1 - gamma) * tolerance / 2, gamma)
         for _ in range(MAX_EVALUATIONS if rounds < MODIFIED_ROUNDS else 0):
             change, squares = sweeps.evaluation_sweep(*arrays)
             record.add(change, math.sqrt(squares), 0, len(V), math.nan, "evaluation")
@@ -272,7 +298,7 @@ def policy_iteration(
     mdp : MDP
         The model.
     gamma : float
-        Discount, in [0, 1). With γ = 1 a policy that never ends has no finite value.
+        Discount, in [0, 1 - 1e-8]. With γ = 1 a policy that never ends has no finite value.
     evaluation_threshold : float, optional
         By default policies are evaluated exactly (`policy_evaluation`). With a threshold they are
         evaluated by synchronous sweeps V ← Σ_k p_k (r_k + γ V(s'_k)) from the V before, until
@@ -307,40 +333,38 @@ def policy_iteration(
     >>> round(plan.V[0], 6), plan.table["policy_changes"].tolist()[-1]
     (np.float64(0.542026), 0)
     """
-    check_model(mdp, gamma)
-    if evaluation_threshold is not None:
-        check_positive("evaluation_threshold", evaluation_threshold)
-    transitions, reward = sweeps.arrays(mdp)
-    Q, V, policy = plan.blank(mdp)
+    gamma, transitions, reward = _opened(mdp, gamma)
+    threshold = checks.optional("evaluation_threshold", evaluation_threshold, _above_zero)
+    largest = _largest(reward, gamma)
+    Q, V, policy = _blank(mdp)
     first = 0  # backups before the first round
     if initial_policy is None:
         sweeps.lookahead(transitions, reward, gamma, V, Q)
         sweeps.greedy(Q, V, policy)
         Q[:], V[:], first = 0, 0, Q.size
     else:
-        policy[:] = plan.checked_policy("initial_policy", initial_policy, mdp)
-    states, largest = np.arange(mdp.n_states), float(np.abs(reward).max())
-    with plan.recording("policy iteration", progress, "evaluation_sweeps") as record:
-        changes = -1
+        policy[:] = checked_policy("initial_policy", initial_policy, mdp)
+    states, changes = np.arange(mdp.n_states), -1
+    with _recording("policy iteration", progress) as record:
         while changes != 0:
-            if evaluation_threshold is None:
+            if threshold is None:
                 V, evaluations = policy_evaluation(mdp, policy, gamma=gamma), 0
             else:
-                evaluations = _evaluate(mdp, policy, gamma, evaluation_threshold, V)
+                evaluations = _evaluate(mdp, policy, gamma, threshold, V)
             residual, squares = sweeps.lookahead(transitions, reward, gamma, V, Q)
             best = Q.max(axis=1)
-            rounding = plan.rounding_error(mdp, max(largest, float(np.abs(V).max())))
+            rounding = rounding_error(mdp.n_successors, max(largest, _magnitude(V)))
             error = (np.abs(Q[states, policy] - V).max() + rounding) / (1 - gamma)
             gain = best - Q[states, policy]
             better = gain > np.maximum(2 * gamma * error, TIE * np.abs(Q).max(axis=1))
             policy = np.where(better, greedy_policy(Q), policy)
             changes = int(better.sum())
-            bound = plan.error_bound(float(np.abs(best - V).max()), gamma, rounding)
+            bound = error_bound(float(np.abs(best - V).max()), gamma, rounding)
             backups = first + Q.size + evaluations * mdp.n_states
             record.add(residual, math.sqrt(squares), changes, backups, bound, evaluations)
             first = 0
     sweeps.greedy(Q, V, policy)
-    return Plan(Q, V, policy, record.table())
+    return Plan(Q, V, policy, record.table("evaluation_sweeps"))
 
 
 def policy_evaluation(mdp: MDP, policy: ArrayLike, *, gamma: float) -> NDArray[np.float64]:
@@ -357,7 +381,7 @@ def policy_evaluation(mdp: MDP, policy: ArrayLike, *, gamma: float) -> NDArray[n
     policy : array of int, shape (S,)
         The action taken in each state.
     gamma : float
-        Discount, in [0, 1).
+        Discount, in [0, 1 - 1e-8].
 
     Returns
     -------
@@ -376,11 +400,11 @@ def policy_evaluation(mdp: MDP, policy: ArrayLike, *, gamma: float) -> NDArray[n
     >>> policy_evaluation(lake, always_right, gamma=0.99)[0].round(4)
     np.float64(0.0288)
     """
-    check_model(mdp, gamma)
-    followed = plan.restricted(mdp, plan.checked_policy("policy", policy, mdp))
+    gamma, _, _ = _opened(mdp, gamma)
+    followed = mdp.following(policy)
+    largest = _largest(followed.reward, gamma) / (1 - gamma)
     if mdp.n_states > DIRECT_LIMIT:
-        largest = float(np.abs(followed.reward).max()) / (1 - gamma)
-        rounding = 4 * plan.rounding_error(mdp, largest) / (1 - gamma)
+        rounding = 4 * rounding_error(mdp.n_successors, largest) / (1 - gamma)
         tolerance = max(1e-10 * largest, rounding, np.finfo(np.float64).tiny)
         return value_iteration(followed, gamma=gamma, tolerance=tolerance, progress=False).V
     S, _, K = followed.successor.shape
@@ -404,7 +428,7 @@ def backup(mdp: MDP, V: ArrayLike, *, gamma: float) -> NDArray[np.float64]:
     V : array of float, shape (S,)
         State values.
     gamma : float
-        Discount, in [0, 1).
+        Discount, in [0, 1 - 1e-8].
 
     Returns
     -------
@@ -422,12 +446,79 @@ def backup(mdp: MDP, V: ArrayLike, *, gamma: float) -> NDArray[np.float64]:
     >>> backup(lake, np.zeros(16), gamma=0.99)[14].round(3).tolist()
     [0.0, 0.333, 0.333, 0.333]
     """
-    check_model(mdp, gamma)
-    values = plan.checked_values(V, mdp)
-    transitions, reward = sweeps.arrays(mdp)
+    gamma, transitions, reward = _opened(mdp, gamma)
+    values = checks.floats("V", V, (mdp.n_states,))
+    _largest(reward, gamma)
+    bounds.check_returns("V", _magnitude(values), 0.0)
     Q = np.zeros((mdp.n_states, mdp.n_actions))
     sweeps.lookahead(transitions, reward, gamma, values, Q)
     return Q
+
+
+def greedy_policy(Q: ArrayLike) -> NDArray[np.signedinteger]:
+    """Return the lowest of the best actions of each state.
+
+    Actions whose values differ by less than 1e-10 of the state's largest |Q| are tied: rounding
+    must not decide between equals.
+
+    Parameters
+    ----------
+    Q : array of float, shape (S, A)
+        Action values.
+
+    Returns
+    -------
+    ndarray of int8 (int32 above 128 actions), shape (S,)
+        The actions.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If `Q` is not a table of finite numbers.
+
+    Examples
+    --------
+    >>> greedy_policy([[0.0, 1.0 - 1e-14, 1.0], [2.0, 0.0, 2.0]]).tolist()
+    [1, 0]
+    """
+    table = _action_values(Q)
+    policy = np.zeros(len(table), dtype=sweeps.action_type(table.shape[1]))
+    sweeps.greedy(table, np.zeros(len(table)), policy)
+    return policy
+
+
+def optimal_actions(Q: ArrayLike, tolerance: float = 1e-9) -> NDArray[np.bool_]:
+    """Mark all best actions of each state: those within `tolerance` of the best.
+
+    Parameters
+    ----------
+    Q : array of float, shape (S, A)
+        Action values.
+    tolerance : float
+        In units of return. Where Q is known to within e, 2 e misses no optimal action. The ties of
+        `greedy_policy` count in any case.
+
+    Returns
+    -------
+    ndarray of bool, shape (S, A)
+        True where the action is among the best.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If `Q` is not a table of finite numbers, or `tolerance` no number, negative or infinite.
+
+    Examples
+    --------
+    >>> optimal_actions([[0.0, 1.0, 0.99]], tolerance=0.1).tolist()
+    [[False, True, True]]
+    """
+    table = _action_values(Q)
+    tolerance = checks.number("tolerance", tolerance, 0)
+    margin = np.maximum(tolerance, TIE * np.abs(table).max(axis=1, keepdims=True))
+    with np.errstate(over="ignore"):
+        best: NDArray[np.bool_] = table >= table.max(axis=1, keepdims=True) - margin
+    return best
 
 
 def _evaluate(
@@ -438,13 +529,89 @@ def _evaluate(
     V: NDArray[np.float64],
 ) -> int:
     """Sweep V for one policy until no value changes by `threshold`; return how many sweeps."""
-    transitions, reward = sweeps.arrays(plan.restricted(mdp, policy))
+    _, transitions, reward = _opened(mdp.following(policy), gamma)
     Q = V[:, None].copy()
     residual, done, limit = math.inf, 0, 1
-    while residual >= threshold and done < limit:  # at the limit only rounding is left
+    while residual >= threshold and done < limit:
         residual, _ = sweeps.lookahead(transitions, reward, gamma, V, Q)
         V[:] = Q[:, 0]
         done += 1
         if done == 1:
-            limit += plan.sweeps_needed(residual, threshold, gamma)
-    return done
+            limit += sweeps_allowed(residual, threshold, gamma)
+    if residual >= max(
+        threshold, rounding_error(mdp.n_successors, max(_magnitude(reward), _magnitude(V)))
+    ):
+        raise ArithmeticError(
+            f"evaluation_threshold {threshold} is too many sweeps away for gamma {gamma}; ask for "
+            f"{2 * residual:.0e} or more"
+        )
+    return done  # at the limit only rounding is left
+
+
+class _Record:
+    """The rows of a plan's table, and the progress bar that shows the last of them."""
+
+    def __init__(self, bar: tqdm[None]) -> None:
+        self.rows: list[tuple[float | int | str, ...]] = []
+        self._bar = bar
+
+    def add(self, residual: float, norm: float, changes: int, backups: int, *more: Any) -> None:
+        """Note a sweep, with its own backups; `more` is the bound and further columns."""
+        self.rows.append((residual, norm, changes, backups, *more))
+        if not math.isnan(more[0]):
+            self._bar.set_postfix_str(f"error at most {more[0]:.1e}", refresh=False)
+        self._bar.update()
+
+    def table(self, *columns: str) -> pd.DataFrame:
+        """Return the rows as a table; `columns` are the further ones."""
+        names = ["residual", "norm", "policy_changes", "backups", "bound", *columns]
+        table = pd.DataFrame(self.rows, columns=names)
+        table["backups"] = table["backups"].cumsum()
+        table.insert(0, "sweep", np.arange(1, len(table) + 1))
+        return table
+
+
+@contextmanager
+def _recording(name: str, progress: bool) -> Iterator[_Record]:
+    """Give a record, and show it on stderr if it takes a while."""
+    hidden = not checks.truth("progress", progress)
+    with tqdm(desc=name, unit=" sweeps", delay=PATIENCE, disable=hidden) as bar:
+        yield _Record(bar)
+
+
+def _opened(mdp: MDP, gamma: float) -> tuple[float, Transitions, NDArray[np.float64]]:
+    """Return discount, transitions and rewards, checked, as the kernels take them."""
+    checks.instance("mdp", mdp, MDP, "an MDP (see MDP.from_env)")
+    found = bounds.discount(gamma)
+    transitions = sweeps.transitions(mdp.successor, mdp.probability)
+    return found, transitions, np.ascontiguousarray(mdp.reward)
+
+
+def _largest(reward: NDArray[np.float64], gamma: float) -> float:
+    """Return the largest |r|, checked to be one from which returns can be summed."""
+    largest = _magnitude(reward)
+    bounds.check_returns("mdp", largest, gamma)
+    return largest
+
+
+def _magnitude(values: NDArray[np.float64]) -> float:
+    """Return the largest absolute value, without an array of them all."""
+    return max(abs(float(values.max())), abs(float(values.min())))
+
+
+def _above_zero(name: str, value: object) -> float:
+    return checks.number(name, value, above=0)
+
+
+def _action_values(Q: ArrayLike) -> NDArray[np.float64]:
+    table = checks.floats("Q", Q, (None, None))
+    checks.require(table.size, "Q", table.shape, "an array with states and actions")
+    return table
+
+
+def _blank(
+    mdp: MDP,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.signedinteger]]:
+    """Return Q and V of zeros, and the policy that always takes action 0."""
+    S, A = mdp.n_states, mdp.n_actions
+    return np.zeros((S, A)), np.zeros(S), np.zeros(S, dtype=sweeps.action_type(A))

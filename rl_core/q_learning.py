@@ -15,11 +15,15 @@ looks at Q(s', .) as any other does.
 
 The loop is written once, in `_learn`. For an `MDP` or a gridded task it is compiled; for a
 Gymnasium environment it runs as it stands. Both agree bit for bit where both play the same world.
+
+In a continuous world the table is over the cells of a grid (`rl_core.worlds.discretise`): c, the
+cell of the observed state, takes the place of s.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -28,46 +32,54 @@ import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import ArrayLike, NDArray
 
-from rl_core import tabular
-from rl_core.compiled import compiled
-from rl_core.discretise import Binned
+from rl_core.checks import (
+    distinct_seeds,
+    fields,
+    floats,
+    instance,
+    integer,
+    integers,
+    number,
+    optional,
+    require,
+)
 from rl_core.exploration import (
-    EPSILON_GREEDY,
     EpsilonGreedy,
-    Evaluation,
     ExplorationRule,
     Schedule,
+    Trials,
     VisitDecay,
-    check_integer,
-    check_number,
-    check_parameter,
-    choose,
-    step_size,
+    check_step_size,
     values,
 )
-from rl_core.mdp import MDP
-from rl_core.planning import value_iteration
-from rl_core.run import Failure, Run
-from rl_core.tabular import Environment, Played, Streams, World, start, step
-from rl_core.tabular_record import (
+from rl_core.kernels.appraisal import (
+    RETURN,
     Appraisal,
     Yardstick,
     as_table,
     empty_record,
     env_steps,
-    make_yardstick,
     new_appraisal,
+    steps_so_far,
     write_episode,
     write_evaluation,
     write_loss,
 )
+from rl_core.kernels.choices import EPSILON_GREEDY, choose, step_size
+from rl_core.kernels.compiled import compiled
+from rl_core.mdp import MDP
+from rl_core.planning import optimal_actions, value_iteration
+from rl_core.training import Failure, Progress, Run
+from rl_core.worlds import tabular
+from rl_core.worlds.discretise import Discretised, GriddedTask, checked_bins, gridded, task_of
+from rl_core.worlds.environments import EnvironmentLike, one_seed_of
+from rl_core.worlds.tabular import DiscreteWorld, Draws, Played, start, step
 
 NO_LIMIT = 2**62
 Q_STAR_TOLERANCE = 1e-10
 
 Values = NDArray[np.float64]
 Counts = NDArray[np.int64]
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -85,8 +97,15 @@ class QLearningConfig:
     max_steps : int or None
         Cap on the length of an episode. None: only the environment's own. A rule that never gets
         to an end then never returns.
-    evaluation : Evaluation
+    max_env_steps : int or None
+        Budget of environment steps a seed. The episode in which it is used up is stopped there and
+        is the seed's last. None: no limit.
+    evaluation : Trials
         When and how the greedy policy is tried out.
+    bins : int or tuple of int or None
+        In a continuous world, bins of every observed number, or of each; None in a discrete one.
+    levels : int or None
+        Levels of each component of a continuous action; None where actions are discrete.
 
     Raises
     ------
@@ -103,47 +122,59 @@ class QLearningConfig:
     step_size: float | Schedule | VisitDecay = 0.2
     exploration: ExplorationRule = field(default_factory=EpsilonGreedy)
     max_steps: int | None = None
-    evaluation: Evaluation = field(default_factory=Evaluation)
+    max_env_steps: int | None = None
+    evaluation: Trials = field(default_factory=Trials)
+    bins: int | tuple[int, ...] | None = None
+    levels: int | None = None
 
     def __post_init__(self) -> None:
-        check_number("gamma", self.gamma, lambda x: 0 <= x <= 1, "numbers in [0, 1]")
-        if not isinstance(self.step_size, VisitDecay):
-            check_parameter("step_size", self.step_size, lambda x: 0 < x <= 1, "numbers in (0, 1]")
-        for name, kind in (("exploration", ExplorationRule), ("evaluation", Evaluation)):
-            if not isinstance(value := getattr(self, name), kind):
-                raise TypeError(f"{name} is {value!r}; allowed are instances of {kind}")
-        if self.max_steps is not None:
-            check_integer("max_steps", self.max_steps, least=1)
+        rules = "EpsilonGreedy(...), Softmax(...) or UnnormalisedSoftmax()"
+        fields(
+            self,
+            gamma=(number, 0, 1),
+            step_size=(_checked_step_size,),
+            exploration=(instance, ExplorationRule, rules),
+            max_steps=(optional, integer, 1),
+            max_env_steps=(optional, integer, 1),
+            evaluation=(instance, Trials, "Trials(...)"),
+            bins=(optional, checked_bins),
+            levels=(optional, integer, 2),
+        )
+
+
+def _checked_step_size(name: str, value: object) -> Any:
+    return value if isinstance(value, VisitDecay) else check_step_size(name, value)
 
 
 def q_learning(
-    env: Environment | MDP | Binned,
+    env: EnvironmentLike | MDP,
     config: QLearningConfig,
     *,
     episodes: int,
-    seeds: Sequence[int],
+    seeds: Iterable[int],
     Q_star: ArrayLike | None = None,
-    snapshots: Sequence[int] = (),
+    snapshots: Iterable[int] = (),
     progress: Progress | None = None,
 ) -> Run:
     """Learn action values, once for every seed.
 
     Parameters
     ----------
-    env : MDP or Binned or str or gymnasium.Env or callable
-        A model, or a compiled task seen through a grid (`rl_core.discretise.binned`), both played
-        compiled; or an environment, its id, or a function that makes one, with discrete
-        observations and actions, played in a plain loop.
+    env : MDP or str or Make or Task or gymnasium.Env or callable
+        A model, played compiled; or an environment (`rl_core.worlds.environments.open_world`) with
+        discrete observations and actions, played in a plain loop. With `config.bins`, a world of
+        Box observations seen through a grid: compiled tasks run compiled. An environment that is
+        given ready made is for one seed only.
     config : QLearningConfig
         Settings.
     episodes : int
         Episodes a seed.
-    seeds : sequence of int
-        Each gives the same bits whichever others are asked for.
+    seeds : iterable of int
+        Distinct, from 0. Each gives the same bits whichever others are asked for.
     Q_star : array, shape (S, A), optional
         The optimal action values. Without them all that is measured against them is NaN; so is
         what needs a model if `env` is an environment that has none.
-    snapshots : sequence of int
+    snapshots : iterable of int
         After which episodes to keep Q and the visit counts; 0 is before the first.
     progress : callable, optional
         Called after each seed with the episodes and environment steps so far, over all seeds.
@@ -190,16 +221,44 @@ def q_learning(
     >>> run.arrays["Q"].shape, len(run.table)
     ((2, 112, 4), 200)
     """
-    seeds, snapshots = _check_arguments(config, episodes, seeds, snapshots)
-    world, model, shape = tabular.opened(env)
-    try:
+    check_q_learning(env, config)
+    seeds = distinct_seeds(one_seed_of(env, seeds))
+    episodes = integer("episodes", episodes, 1)
+    at = integers("snapshots", snapshots, 0, episodes)
+    if progress is not None:
+        instance("progress", progress, Callable, "a function of episodes and steps, or None")
+    with _opened(env, config) as (_, model, shape):
         yardstick = make_yardstick(model, Q_star, shape)
-        learn = _learn if isinstance(world, Played) else _learn_compiled
-        learner = _Learner(learn, world, shape, yardstick)
-        return _train(learner, config, episodes, seeds, snapshots, progress)
-    finally:
-        if isinstance(world, Played) and world.env is not env:
-            world.env.close()
+    task, record = _task(config, episodes), empty_record(len(seeds), episodes)
+    arrays, failures = _empty_arrays(len(seeds), len(at), shape), []
+    for i, seed in enumerate(seeds):
+        own = {name: array[i] for name, array in arrays.items()}
+        with _opened(env, config) as (world, _, _):
+            failure = _train(world, task, yardstick, seed, at, own, record[i])
+        failures += [] if failure is None else [failure]
+        if progress is not None:
+            progress((i + 1) * episodes, env_steps(record))
+    return Run(as_table(record, seeds), arrays, tuple(failures))
+
+
+def check_q_learning(env: object, config: object) -> None:
+    """Raise what `q_learning` would raise for a world and a configuration; run nothing.
+
+    `rl_core.experiments.run` calls it for every arm before it begins with any.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `config` is no QLearningConfig, the environment unknown, or bins or levels not for its
+        spaces.
+
+    Examples
+    --------
+    >>> check_q_learning("MountainCar-v0", QLearningConfig(bins=10))
+    """
+    instance("config", config, QLearningConfig, "a QLearningConfig")
+    with _opened(env, config):
+        pass
 
 
 def q_learning_on_model(
@@ -207,8 +266,8 @@ def q_learning_on_model(
     config: QLearningConfig,
     *,
     episodes: int,
-    seeds: Sequence[int],
-    snapshots: Sequence[int] = (),
+    seeds: Iterable[int],
+    snapshots: Iterable[int] = (),
     progress: Progress | None = None,
 ) -> Run:
     """Learn on the exact model of an environment, compiled, measured against the optimal values.
@@ -241,9 +300,7 @@ def q_learning_on_model(
     >>> run.table["error_norm"].iloc[[0, -1]].round().tolist()  # it cannot get below 7.957
     [25.0, 8.0]
     """
-    if not isinstance(env, str):
-        raise TypeError(f"env is {env!r}; allowed is an environment's id")
-    seeds, snapshots = _check_arguments(config, episodes, seeds, snapshots)
+    check_q_learning_on_model(env, config)
     model = MDP.from_env(env)
     limit = gym.spec(env).max_episode_steps
     if limit is not None:
@@ -264,6 +321,89 @@ def q_learning_on_model(
     )
 
 
+def check_q_learning_on_model(env: object, config: object) -> None:
+    """Raise what `q_learning_on_model` would raise for an environment and a configuration.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `env` is no id or has no model, or `config` is no QLearningConfig with gamma below 1.
+
+    Examples
+    --------
+    >>> check_q_learning_on_model("rl_core/Maze-v0", QLearningConfig())
+    """
+    instance("env", env, str, "an environment's id")
+    instance("config", config, QLearningConfig, "a QLearningConfig")
+    require(config.gamma < 1, "gamma", config.gamma, "below 1, for planning")  # type: ignore[attr-defined]
+    MDP.from_env(env)  # type: ignore[arg-type]
+
+
+@contextmanager
+def _opened(env: Any, config: Any) -> Iterator[tuple[DiscreteWorld, MDP | None, tuple[int, int]]]:
+    """Open the world to act in; give it with its model, if it has one, and the shape of Q."""
+    if isinstance(env, MDP):
+        yield tabular.model_arrays(env), env, (env.n_states, env.n_actions)
+        return
+    if config.bins is not None and (task := task_of(env)) is not None:
+        grid = gridded(task, config.bins, levels=config.levels)
+        yield grid, None, grid.shape
+        return
+    cut = env if config.bins is None else Discretised(env, config.bins, levels=config.levels)
+    world = tabular.played(cut)
+    try:
+        yield world, tabular.known_model(world), (int(world.observations.n), int(world.actions.n))
+    finally:
+        if world.env is not env:
+            world.env.close()
+
+
+def make_yardstick(
+    model: MDP | None, Q_star: ArrayLike | None, shape: tuple[int, int]
+) -> Yardstick:
+    """Return what tables of a shape are measured against.
+
+    Parameters
+    ----------
+    model : MDP or None
+        At least S states (a terminal one may be appended), or None if it is not known.
+    Q_star : array, shape (S, A), or None
+        The optimal action values, or None if they are not known.
+    shape : tuple of int
+        (S, A).
+
+    Raises
+    ------
+    TypeError, ValueError
+        `Q_star` is not made of finite numbers or has another shape.
+
+    Examples
+    --------
+    >>> from rl_core.maze import Maze
+    >>> yardstick = make_yardstick(Maze().model(), np.zeros((112, 4)), (112, 4))
+    >>> int(yardstick.visitable.sum())
+    92
+    """
+    best = np.empty((0, shape[1])) if Q_star is None else floats("Q_star", Q_star, shape)
+    optimal = optimal_actions(best) if len(best) else best.astype(np.bool_)
+    if model is None:
+        nowhere = np.empty((0, 0, 0))
+        return Yardstick(
+            best,
+            optimal,
+            np.empty(0, dtype=np.bool_),
+            *(nowhere.astype(np.int32), nowhere, nowhere, np.empty(0, dtype=np.bool_)),
+            *(np.empty(0, dtype=np.int32), np.empty(0)),
+        )
+    return Yardstick(
+        best,
+        optimal,
+        (model.reachable_states() & ~model.terminal)[: shape[0]],
+        *(model.successor, model.probability, model.reward, model.terminal),
+        *(model.start_state, model.start_probability),
+    )
+
+
 class _Task(NamedTuple):
     """The configuration as the loop reads it; schedules laid out over the episodes."""
 
@@ -273,6 +413,7 @@ class _Task(NamedTuple):
     exponent: float
     gamma: float
     max_steps: int
+    max_env_steps: int
     trial_every: int
     trial_episodes: int
     trial_max_steps: int
@@ -281,7 +422,7 @@ class _Task(NamedTuple):
 
 def _task(config: QLearningConfig, episodes: int) -> _Task:
     if isinstance(config.step_size, VisitDecay):
-        initial, exponent = config.step_size.initial, float(config.step_size.exponent)
+        initial, exponent = config.step_size.initial, config.step_size.exponent
     else:
         initial, exponent = config.step_size, 0.0
     return _Task(
@@ -289,22 +430,23 @@ def _task(config: QLearningConfig, episodes: int) -> _Task:
         parameter=values(config.exploration.parameter, episodes),
         step_size=values(initial, episodes),
         exponent=exponent,
-        gamma=float(config.gamma),
-        max_steps=NO_LIMIT if config.max_steps is None else int(config.max_steps),
-        trial_every=int(config.evaluation.every),
-        trial_episodes=int(config.evaluation.episodes),
-        trial_max_steps=int(config.evaluation.max_steps),
-        trial_epsilon=float(config.evaluation.epsilon),
+        gamma=config.gamma,
+        max_steps=config.max_steps or NO_LIMIT,
+        max_env_steps=config.max_env_steps or NO_LIMIT,
+        trial_every=config.evaluation.every,
+        trial_episodes=config.evaluation.episodes,
+        trial_max_steps=config.evaluation.max_steps,
+        trial_epsilon=config.evaluation.epsilon,
     )
 
 
 def _learn(
-    world: World,
+    world: DiscreteWorld,
     task: _Task,
     yardstick: Yardstick,
     appraisal: Appraisal,
-    streams: Streams,
-    trial_streams: Streams,
+    draws: Draws,
+    trial_draws: Draws,
     Q: Values,
     visits: Counts,
     record: Values,
@@ -313,10 +455,15 @@ def _learn(
 ) -> int:
     """Learn from the episodes `first` to `last` - 1, write a row for each, and return `last`.
 
-    Stop at an episode whose return is not finite and return its number instead.
+    Stop after an episode whose return is not finite, or in which the budget is used up; then return
+    its number instead.
     """
     for k in range(first, last):
-        outcome = _learn_episode(world, task, streams, Q, visits, k)
+        left = task.max_env_steps - steps_so_far(record, k)
+        if left <= 0:
+            return k - 1
+        max_steps = min(task.max_steps, left)
+        outcome = _learn_episode(world, task, draws, Q, visits, k, max_steps)
         write_episode(record, k, outcome, Q, yardstick)
         if not np.isfinite(outcome[1]):
             return k
@@ -326,22 +473,28 @@ def _learn(
         if on_trial:
             trials = np.empty((task.trial_episodes, 2))
             for i in range(task.trial_episodes):
-                trials[i] = _try_episode(world, task, trial_streams, Q)
+                trials[i] = _try_episode(world, task, trial_draws, Q)
             write_evaluation(record, k, trials)
     return last
 
 
 @register_jitable
 def _learn_episode(
-    world: World, task: _Task, streams: Streams, Q: Values, visits: Counts, k: int
+    world: DiscreteWorld,
+    task: _Task,
+    draws: Draws,
+    Q: Values,
+    visits: Counts,
+    k: int,
+    max_steps: int,
 ) -> tuple[int, float, bool, int]:
     """Learn from episode k; return its steps, return, end and newly visited entries."""
     steps, total, new_entries, terminated, truncated = 0, 0.0, 0, False, False
-    s = start(world, streams)
-    while not (terminated or truncated) and steps < task.max_steps:
-        u, v = streams.policy.random(), streams.policy.random()
+    s = start(world, draws)
+    while not (terminated or truncated) and steps < max_steps:
+        u, v = draws.policy.random(), draws.policy.random()
         a = choose(task.rule, task.parameter[k], Q[s], u, v)
-        s_next, r, terminated, truncated = step(world, s, a, streams)
+        s_next, r, terminated, truncated = step(world, s, a, draws)
         new_entries += visits[s, a] == 0
         visits[s, a] += 1
         alpha = step_size(task.step_size[k], task.exponent, visits[s, a])
@@ -353,14 +506,14 @@ def _learn_episode(
 
 
 @register_jitable
-def _try_episode(world: World, task: _Task, streams: Streams, Q: Values) -> tuple[float, float]:
+def _try_episode(world: DiscreteWorld, task: _Task, draws: Draws, Q: Values) -> tuple[float, float]:
     """Play an episode of the evaluation; return its return and steps."""
     steps, total, terminated, truncated = 0, 0.0, False, False
-    s = start(world, streams)
+    s = start(world, draws)
     while not (terminated or truncated) and steps < task.trial_max_steps:
-        u, v = streams.policy.random(), streams.policy.random()
+        u, v = draws.policy.random(), draws.policy.random()
         a = choose(EPSILON_GREEDY, task.trial_epsilon, Q[s], u, v)
-        s, r, terminated, truncated = step(world, s, a, streams)
+        s, r, terminated, truncated = step(world, s, a, draws)
         steps += 1
         total += r
     return total, float(steps)
@@ -383,78 +536,47 @@ def _update(
     Q[s, a] += alpha * (target - Q[s, a])
 
 
-class _Learner(NamedTuple):
-    """The loop, the world it plays in, the shape of Q, and what Q is measured against."""
-
-    learn: Callable[..., int]
-    world: World
-    shape: tuple[int, int]
-    yardstick: Yardstick
+def _empty_arrays(
+    n_seeds: int, n_snapshots: int, shape: tuple[int, int]
+) -> dict[str, NDArray[Any]]:
+    """Return tables and counts of zeros for every seed, and room for the snapshots of both."""
+    arrays: dict[str, NDArray[Any]] = {}
+    for name, dtype in (("Q", np.float64), ("visits", np.int64)):
+        arrays[name] = np.zeros((n_seeds, *shape), dtype)
+    for name in ("Q", "visits") if n_snapshots else ():
+        arrays[f"{name}_snapshots"] = np.zeros((n_seeds, n_snapshots, *shape), arrays[name].dtype)
+    return arrays
 
 
 def _train(
-    learner: _Learner,
-    config: QLearningConfig,
-    episodes: int,
-    seeds: Sequence[int],
+    world: DiscreteWorld,
+    task: _Task,
+    yardstick: Yardstick,
+    seed: int,
     snapshots: Sequence[int],
-    progress: Progress | None,
-) -> Run:
-    """Run every seed, stopping at the snapshots, and gather tables and arrays."""
-    task = _task(config, episodes)
-    arrays: dict[str, NDArray[Any]] = {
-        "Q": np.zeros((len(seeds), *learner.shape)),
-        "visits": np.zeros((len(seeds), *learner.shape), dtype=np.int64),
-    }
-    for name in ("Q", "visits") if snapshots else ():
-        shape = (len(seeds), len(snapshots), *learner.shape)
-        arrays[f"{name}_snapshots"] = np.zeros(shape, dtype=arrays[name].dtype)
-    record = empty_record(len(seeds), episodes)
-    failures = []
-    for i, seed in enumerate(seeds):
-        streams, appraisal = tabular.spawn_streams(seed, 2), new_appraisal(learner.yardstick)
-        if isinstance(learner.world, Played):
-            learner.world.env.reset(seed=int(seed))  # for what else the environment draws from
-        Q, visits, first = arrays["Q"][i], arrays["visits"][i], 0
-        for last in sorted({*snapshots, episodes}):
-            stopped = learner.learn(
-                *(learner.world, task, learner.yardstick, appraisal, *streams),
-                *(Q, visits, record[i], first, last),
-            )
-            if stopped < last:
-                failures.append(Failure(seed, stopped + 1, "the return is not finite"))
-                break
-            for j in [j for j, wanted in enumerate(snapshots) if wanted == last]:
-                arrays["Q_snapshots"][i, j] = Q
-                arrays["visits_snapshots"][i, j] = visits
-            first = last
-        if progress is not None:
-            progress((i + 1) * episodes, env_steps(record))
-    return Run(as_table(record, seeds), arrays, tuple(failures))
-
-
-def _check_arguments(
-    config: object, episodes: int, seeds: Sequence[int], snapshots: Sequence[int]
-) -> tuple[list[int], list[int]]:
-    """Raise on whatever does not depend on the environment; return seeds and snapshots as lists."""
-    if not isinstance(config, QLearningConfig):
-        raise TypeError(f"config is {config!r}; allowed is a QLearningConfig")
-    check_integer("episodes", episodes, least=1)
-    numbers = _integers("seeds", seeds)
-    if not numbers or len(set(numbers)) < len(numbers):
-        raise ValueError(f"seeds is {numbers}; allowed is at least one, each once")
-    at = _integers("snapshots", snapshots)
-    for episode in at:
-        if episode > episodes:
-            raise ValueError(f"snapshots has {episode}; allowed are 0 to {episodes}")
-    return numbers, at
-
-
-def _integers(name: str, values: object) -> list[int]:
-    """Return a sequence of integers from 0, an array or not, as a list of Python's own."""
-    if not isinstance(values, Iterable) or isinstance(values, str):
-        raise TypeError(f"{name} is {values!r}; allowed is a sequence of integers from 0")
-    found = list(values)
-    for value in found:
-        check_integer(name, value, least=0)
-    return [int(value) for value in found]
+    arrays: dict[str, NDArray[Any]],
+    record: Values,
+) -> Failure | None:
+    """Run one seed, pausing at the snapshots; return why it failed, if it did."""
+    learn = _learn if isinstance(world, Played) else _learn_compiled
+    draws, appraisal = tabular.spawn_draws(seed, 2), new_appraisal(yardstick)
+    if isinstance(world, Played):
+        world.env.reset(seed=seed)  # for what else the environment draws from
+    if isinstance(world, GriddedTask) and world.max_steps > 0:
+        trial_max_steps = min(task.trial_max_steps, world.max_steps)
+        max_steps = min(task.max_steps, world.max_steps)
+        task = task._replace(max_steps=max_steps, trial_max_steps=trial_max_steps)
+    first, episodes = 0, len(record)
+    for last in sorted({*snapshots, episodes}):
+        stopped = learn(
+            *(world, task, yardstick, appraisal, *draws),
+            *(arrays["Q"], arrays["visits"], record, first, last),
+        )
+        ended = stopped < last  # then later snapshots are of the last table
+        for j in [j for j, at in enumerate(snapshots) if at == last or (ended and at > last)]:
+            arrays["Q_snapshots"][j], arrays["visits_snapshots"][j] = arrays["Q"], arrays["visits"]
+        if ended:
+            bad = not np.isfinite(record[stopped, RETURN])
+            return Failure(seed, stopped + 1, "the return is not finite") if bad else None
+        first = last
+    return None

@@ -1,20 +1,13 @@
 """REINFORCE: Monte Carlo policy gradient with categorical and Gaussian policies.
 
-After every episode s_0, a_0, r_1, s_1, ..., s_T the parameters theta climb the log-likelihood of
-the actions taken, weighted by what followed them:
+After every episode s_0, a_0, r_1, s_1, ..., s_T theta climbs the log-likelihood of its actions,
+weighted by what followed them:
 
     v_t = sum_{k >= t} gamma^(k - t) r_{k + 1},    normalised within the episode,
     theta <- theta + alpha * grad (1 / |B|) sum_{t in B} v_t log pi(a_t | s_t)
 
 for minibatches B of the episode, over several epochs, with Adam in place of the plain step. The
 factor gamma^t of the textbook's update is left out, as in the report and in common practice.
-
-CartPole-v1 is learned through the plain loop with
-
-    ReinforceConfig(gamma=0.995, hidden=(64,), learning_rate=2e-3, epochs=1)
-
-in 1,000 episodes: these settings were chosen on seeds 1000 to 1014, of which 13 came to an average
-return of at least 450 over the last 50 episodes. A test holds most of seeds 0 to 9 to the same.
 
     for each seed:
         draw the initial weights
@@ -29,41 +22,34 @@ gradient-following algorithms for connectionist reinforcement learning.
 """
 
 import math
-import sys
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Iterable
+from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
-import pandas as pd
+import torch
 from numpy.typing import NDArray
 
-from rl_core import networks, policies
-from rl_core.compiled import compiled
-from rl_core.episodes import (
-    Environment,
-    EnvironmentLike,
-    Trajectory,
-    checked_seeds,
-    checked_snapshots,
-    open_environment,
-    spawn_streams,
-)
+from rl_core import modules
+from rl_core.checks import fields, instance, integer, number, one_of, optional, positive, truth
+from rl_core.episodes import ModuleActor, Trajectory, play_episode, with_constant
+from rl_core.kernels import likelihood
+from rl_core.kernels.compiled import compiled
+from rl_core.kernels.likelihood import Actor, Policy
 from rl_core.policies import (
+    MLP,
     Categorical,
     Gaussian,
-    Policy,
-    is_integer,
-    is_number,
-    is_one_of,
-    likelihood_gradient,
-    require,
+    Network,
+    check_network,
+    initial_parameters,
+    make_policy,
+    trainable,
 )
-from rl_core.run import Failure, Run
-
-PROGRESS_EVERY = 10
-"""Episodes between two reports of progress."""
+from rl_core.training import Progress, Run, Training, spawn_streams, train_seeds
+from rl_core.worlds.environments import EnvironmentLike, World, one_seed_of, open_world
 
 
 @dataclass(frozen=True)
@@ -74,44 +60,41 @@ class ReinforceConfig:
     ----------
     gamma : float
         Discount, from 0 to 1.
-    hidden : tuple of int
-        Widths of the hidden layers, rectified linear units; () for a linear network.
-    biases : bool
-        Whether biases are learned; else they stay zero.
+    network : MLP or Module
+        From what is observed to the policy's outputs.
     policy : Categorical or Gaussian
         How the outputs of the network become actions.
     learning_rate : float
         Adam's step size alpha, above 0.
-    batch_size : int
-        Largest minibatch, in steps. The last one of an epoch may be smaller.
-    epochs : int
-        Passes over an episode, in a new random order each.
+    batch_size, epochs : int
+        Largest minibatch, in steps, and passes over an episode, each in a new random order.
     normalise : {"standard", "centre", "none"}
         Returns within an episode: shifted to mean 0 and scaled to variance 1, only shifted, or raw.
         Equal returns have no variance to scale by: they become 0.
     max_episode_steps : int or None
         Where to stop an episode that has not ended. None: nowhere.
     max_env_steps : int or None
-        Budget of environment steps a seed. The episode in which it is used up is stopped there and
-        is the seed's last. None: no limit. An episode needs about 100 bytes of memory a step.
+        Budget of environment steps a seed: where it is used up the last episode is stopped. None:
+        no limit. An episode needs about 100 bytes of memory a step.
     learn_from_capped : bool
-        Whether to learn from an episode stopped by a cap, the environment's own time limit
-        included. Its returns leave out what would have followed. The 2018 program did not.
+        Whether to learn from an episode stopped by a cap or the environment's own time limit. Its
+        returns leave out what would have followed. The 2018 program did not.
+    engine : {"compiled", "torch"} or None
+        What learns. None: machine code for an MLP, torch for a Module.
 
     Raises
     ------
-    ValueError
-        For a value out of range.
+    TypeError, ValueError
+        For a value of another kind or out of range.
 
     Examples
     --------
-    >>> ReinforceConfig(gamma=0.9, hidden=(10,)).normalise
-    'standard'
+    >>> ReinforceConfig(gamma=0.9, network=MLP((10,))).engine
+    'compiled'
     """
 
     gamma: float = 0.99
-    hidden: tuple[int, ...] = (10, 20)
-    biases: bool = True
+    network: Network = field(default_factory=MLP)
     policy: Categorical | Gaussian = field(default_factory=Categorical)
     learning_rate: float = 1e-3
     batch_size: int = 512
@@ -120,32 +103,23 @@ class ReinforceConfig:
     max_episode_steps: int | None = None
     max_env_steps: int | None = 10_000_000
     learn_from_capped: bool = True
+    engine: Literal["compiled", "torch"] | None = None
 
     def __post_init__(self) -> None:
-        forms = ("standard", "centre", "none")
-        rate, hidden = self.learning_rate, self.hidden
-        checks = {
-            "gamma": (is_number(self.gamma) and 0 <= self.gamma <= 1, "a number from 0 to 1"),
-            "hidden": (
-                isinstance(hidden, tuple) and all(is_integer(width, 1) for width in hidden),
-                "a tuple of positive integers",
-            ),
-            "biases": (isinstance(self.biases, bool), "a bool"),
-            "policy": (
-                isinstance(self.policy, Categorical | Gaussian),
-                "Categorical() or Gaussian(...)",
-            ),
-            "learning_rate": (is_number(rate) and rate > 0, "a finite number above 0"),
-            "batch_size": (is_integer(self.batch_size, 1), "a positive integer"),
-            "epochs": (is_integer(self.epochs, 1), "a positive integer"),
-            "normalise": (is_one_of(self.normalise, forms), f"one of {forms}"),
-            "learn_from_capped": (isinstance(self.learn_from_capped, bool), "a bool"),
-        }
-        for name in ("max_episode_steps", "max_env_steps"):
-            value = getattr(self, name)
-            checks[name] = (value is None or is_integer(value, 1), "a positive integer or None")
-        for name, (valid, allowed) in checks.items():
-            require(valid, name, getattr(self, name), allowed)
+        fields(
+            self,
+            gamma=(number, 0, 1),
+            network=(instance, Network, "MLP(...) or Module('module:function')"),
+            policy=(instance, Categorical | Gaussian, "Categorical() or Gaussian(...)"),
+            learning_rate=(positive,),
+            batch_size=(integer, 1),
+            epochs=(integer, 1),
+            normalise=(one_of, ("standard", "centre", "none")),
+            max_episode_steps=(optional, integer, 1),
+            max_env_steps=(optional, integer, 1),
+            learn_from_capped=(truth,),
+        )
+        object.__setattr__(self, "engine", check_network(self.network, self.engine))
 
 
 @compiled
@@ -193,69 +167,138 @@ def normalised(returns: NDArray[np.float64], centre: bool, scale: bool) -> NDArr
     return deviations
 
 
-class _Adam(NamedTuple):
-    """State of the optimiser of one seed."""
-
-    first: NDArray[np.float32]
-    second: NDArray[np.float32]
-    trainable: NDArray[np.float32]
-    steps: NDArray[np.int64]
-
-
-class _Settings(NamedTuple):
-    """The part of the config that the compiled learner reads."""
-
-    gamma: float
-    centre: bool
-    scale: bool
-    batch_size: int
-    learning_rate: float
-
-
-@compiled
-def _learn(
-    settings: _Settings,
+def log_probability(
     policy: Policy,
-    parameters: NDArray[np.float32],
-    adam: _Adam,
-    orders: NDArray[np.int64],
-    observations: NDArray[np.float32],
-    actions: NDArray[np.float32],
-    rewards: NDArray[np.float64],
-) -> None:
-    """Learn from an episode: change the parameters and the state of their optimiser in place.
+    outputs: torch.Tensor,
+    features: torch.Tensor,
+    actions: torch.Tensor,
+    log_sigma: torch.Tensor,
+) -> torch.Tensor:
+    """The logarithm of pi(a|s) for a batch, given the network's outputs for its features.
 
-    `orders`, of shape (epochs, T), holds the order of the steps in each epoch.
+    Shapes: (batch, outputs), (batch, features), (batch, action_width), of a Gaussian
+    (action_width,), and of what is returned (batch,).
+
+    Examples
+    --------
+    >>> policy = make_policy(Categorical(), (), 1, 2, 0)
+    >>> y, s, a = torch.zeros(1, 2), torch.ones(1, 1), torch.ones(1, 1)
+    >>> round(float(log_probability(policy, y, s, a, torch.zeros(0)).exp()), 3)
+    0.5
     """
-    returns = discounted_returns(rewards, settings.gamma)
-    returns = normalised(returns, settings.centre, settings.scale)
-    largest = min(settings.batch_size, rewards.size)
-    shape = (policy.sizes.sum(), networks.padded(largest))
-    units, deltas = np.empty(shape, np.float32), np.empty(shape, np.float32)
-    gradient = np.empty(parameters.size, np.float32)
-    for order in orders:
-        for start in range(0, rewards.size, largest):
-            batch = order[start : start + largest]
-            likelihood_gradient(
-                policy,
-                parameters,
-                observations[batch],
-                actions[batch],
-                (returns[batch] / batch.size).astype(np.float32),
-                units,
-                deltas,
-                gradient,
-            )
-            gradient *= adam.trainable
-            adam.steps[0] += 1
-            networks.adam_step(
-                parameters,
-                gradient,
-                adam.first,
-                adam.second,
-                adam.steps[0],
-                settings.learning_rate,
-            )
+    if not policy.gaussian:
+        return torch.log_softmax(outputs, 1).gather(1, actions.long()).squeeze(1)
+    mu = outputs
+    if policy.weighted_features:
+        mu = (outputs.view(len(outputs), policy.action_width, -1) * features[:, None]).sum(2)
+    z = (actions - mu) / log_sigma.exp()
+    return (-(z**2) / 2 - log_sigma - math.log(2 * math.pi) / 2).sum(1)
+
+
+class TorchLearner:
+    """REINFORCE as its equation says, for any network from features to outputs.
+
+    Parameters
+    ----------
+    policy : Policy
+    module : torch.nn.Module
+    log_sigma : torch.nn.Parameter
+    config : ReinforceConfig
+    """
+
+    def __init__(
+        self,
+        policy: Policy,
+        module: torch.nn.Module,
+        log_sigma: torch.nn.Parameter,
+        config: ReinforceConfig,
+    ) -> None:
+        self.policy, self.module, self.log_sigma = policy, module, log_sigma
+        self.batch_size = config.batch_size
+        learned = [p for p in (*module.parameters(), log_sigma) if p.requires_grad]
+        self.optimiser = modules.Adam(learned, lr=config.learning_rate)
+
+    def loss(self, features: torch.Tensor, actions: torch.Tensor, v: torch.Tensor) -> torch.Tensor:
+        """-1 / |B| sum_{t in B} v_t log pi(a_t|s_t): its descent is the climb of the likelihood."""
+        log_pi = log_probability(
+            self.policy, self.module(features), features, actions, self.log_sigma
+        )
+        return -(v * log_pi).mean()
+
+    def learn(
+        self,
+        observations: NDArray[np.float32],
+        actions: NDArray[np.float32],
+        returns: NDArray[np.float64],
+        orders: NDArray[np.int64],
+    ) -> None:
+        """Learn from an episode: a step of the optimiser a minibatch; see `likelihood.learn`."""
+        s = torch.from_numpy(with_constant(self.policy, observations))
+        a, v = torch.from_numpy(actions), torch.from_numpy(returns).float()
+        for order in torch.from_numpy(orders):
+            for batch in order.split(self.batch_size):
+                loss = self.loss(s[batch], a[batch], v[batch])
+                self.optimiser.zero_grad()
+                loss.backward()
+                self.optimiser.step()
+
+
+class _Agent(NamedTuple):
+    """Who acts, who learns, and what is learned by name."""
+
+    actor: Actor | ModuleActor
+    learn: Callable[..., None]
+    arrays: Callable[[], dict[str, NDArray[Any]]]
+
+
+def fitted_policy(config: ReinforceConfig, world: World) -> Policy:
+    """Fit the policy to a world; of a `Module` only inputs and outputs are known as sizes."""
+    hidden = config.network.hidden if isinstance(config.network, MLP) else ()
+    spaces = world.n_observations, world.n_actions, world.action_dimensions
+    return make_policy(config.policy, hidden, *spaces)
+
+
+def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator) -> _Agent:
+    """Draw the initial weights and set up the engine that learns them."""
+    policy = fitted_policy(config, world)
+    n_sigmas = policy.action_width if policy.gaussian else 0
+    if not isinstance(config.network, MLP):
+        n_inputs, n_outputs = policy.sizes.tolist()
+        module = modules.make_module(config.network, n_inputs, n_outputs, rng)
+        start = math.log(config.policy.sigma) if isinstance(config.policy, Gaussian) else 0.0
+        log_sigma = _log_sigma(config, torch.full((n_sigmas,), start))
+        learner = TorchLearner(policy, module, log_sigma, config)
+
+        def by_name() -> dict[str, NDArray[Any]]:
+            sigma = {"log_sigma": log_sigma.detach().numpy()} if policy.gaussian else {}
+            return {**modules.as_arrays(module), **sigma}
+
+        return _Agent(ModuleActor(policy, module, log_sigma), learner.learn, by_name)
+    biases = config.network.biases
+    parameters = initial_parameters(policy, config.policy, rng)
+
+    def layers() -> dict[str, NDArray[Any]]:
+        named = likelihood.unpack(policy, parameters)
+        return {name: array for name, array in named.items() if biases or "bias" not in name}
+
+    learn: Callable[..., None]
+    if config.engine == "torch":
+        vector = torch.from_numpy(parameters)  # actor and module share its memory
+        module = modules.perceptron(policy.sizes.tolist(), parameters, biases)
+        log_sigma = _log_sigma(config, vector[len(vector) - n_sigmas :])
+        learn = TorchLearner(policy, module, log_sigma, config).learn
+    else:
+        learns = trainable(policy, config.policy, biases)
+        rates = config.batch_size, config.learning_rate
+        learn = partial(
+            likelihood.learn, likelihood.make_learner(policy, parameters, learns, *rates)
+        )
+    return _Agent(likelihood.make_actor(policy, parameters), learn, layers)
+
+
+def _log_sigma(config: ReinforceConfig, start: torch.Tensor) -> torch.nn.Parameter:
+    learns = isinstance(config.policy, Gaussian) and config.policy.learn_sigma
+    return torch.nn.Parameter(start, requires_grad=learns)
 
 
 def _orders(config: ReinforceConfig, steps: int, rng: np.random.Generator) -> NDArray[np.int64]:
@@ -267,94 +310,46 @@ def _orders(config: ReinforceConfig, steps: int, rng: np.random.Generator) -> ND
     return orders
 
 
-@dataclass
-class _Seed:
-    """What became of one seed."""
-
-    seed: int
-    parameters: NDArray[np.float32]
-    snapshots: dict[str, NDArray[np.float32]]
-    rows: list[tuple[int, float, bool]] = field(default_factory=list)  # steps, return, terminated
-    env_steps: int = 0
-    failure: Failure | None = None
-
-
-def _train(
-    environment: Environment,
-    policy: Policy,
-    config: ReinforceConfig,
-    episodes: int,
-    seed: int,
-    snapshots: Collection[int],
-    report: Callable[[int, int], object],
-) -> _Seed:
-    """Train one seed, and tell `report` its episodes and environment steps so far."""
-    streams = spawn_streams(seed)
-    environment.seed(streams.environment_seed)
-    parameters = policies.initial_parameters(policy, config.policy, streams.network)
-    adam = _Adam(
-        np.zeros_like(parameters),
-        np.zeros_like(parameters),
-        policies.trainable(policy, config.policy, config.biases),
-        np.zeros(1, np.int64),
-    )
-    settings = _Settings(
-        float(config.gamma),
-        config.normalise != "none",
-        config.normalise == "standard",
-        config.batch_size,
-        float(config.learning_rate),
-    )
-    trajectory = Trajectory(environment.n_observations, policy.action_width)
-    trained = _Seed(seed, parameters, {"initial/": parameters.copy()})
-    budget = config.max_env_steps or sys.maxsize
-    for episode in range(1, episodes + 1):
-        max_steps = min(config.max_episode_steps or sys.maxsize, budget - trained.env_steps)
-        steps, terminated = environment.play(
-            policy, parameters, streams.policy, max_steps, trajectory
-        )
+def _train(world: World, config: ReinforceConfig, training: Training) -> None:
+    """Train one seed."""
+    streams = spawn_streams(training.seed)
+    world.seed(streams.environment_seed)
+    actor, learn, arrays = _make_agent(config, world, streams.network)
+    training.keep("initial/", arrays())
+    trajectory = Trajectory(world.n_observations, actor.policy.action_width)
+    centre, scale = config.normalise != "none", config.normalise == "standard"
+    for episode in training.course(config.max_env_steps):
+        max_steps = training.max_steps(config.max_episode_steps)
+        steps, terminated = play_episode(world, actor, streams.policy, max_steps, trajectory)
+        observations, actions, rewards = trajectory.first(steps)
         with np.errstate(invalid="ignore", over="ignore"):
-            episode_return = float(trajectory.rewards[:steps].sum())
-        trained.rows.append((steps, episode_return, terminated))
-        trained.env_steps += steps
-        if not math.isfinite(episode_return):
-            trained.failure = Failure(seed, episode, f"the return is {episode_return}")
-            break
-        if terminated or config.learn_from_capped:
-            orders = _orders(config, steps, streams.network)
-            _learn(settings, policy, parameters, adam, orders, *trajectory.first(steps))
-        if not np.isfinite(parameters).all():
-            trained.failure = Failure(seed, episode, "a weight is not finite after learning")
-            break
-        if episode in snapshots:
-            trained.snapshots[f"episode{episode}/"] = parameters.copy()
-        if episode % PROGRESS_EVERY == 0:
-            report(episode, trained.env_steps)
-        if trained.env_steps >= budget:
-            break
-    return trained
+            training.add(steps, float(rewards.sum()), terminated)
+        if training.failure is None and (terminated or config.learn_from_capped):
+            v = normalised(discounted_returns(rewards, config.gamma), centre, scale)
+            learn(observations, actions, v, _orders(config, steps, streams.network))
+            if not all(np.isfinite(array).all() for array in arrays().values()):
+                training.fail("a weight is not finite after learning")
+        if training.wants(episode):
+            training.keep(f"episode{episode}/", arrays())
+    training.keep("", arrays())
 
 
 def check_reinforce(env: EnvironmentLike, config: ReinforceConfig) -> None:
     """Raise what `reinforce` would raise for an environment and a configuration; run nothing.
 
-    `rl_core.experiments.run` calls it for every arm before it begins with any.
-
     Raises
     ------
     ValueError, TypeError
-        If `config` is no ReinforceConfig, the environment unknown, or its spaces of another kind.
+        If `config` is no ReinforceConfig, the environment unknown, its spaces of another kind, or
+        the network's output of another shape.
 
     Examples
     --------
     >>> check_reinforce("MountainCar-v0", ReinforceConfig())
     """
-    require(isinstance(config, ReinforceConfig), "config", config, "a ReinforceConfig")
-    environment = open_environment(env)
-    try:
-        _policy(config, environment)
-    finally:
-        environment.close()
+    instance("config", config, ReinforceConfig, "a ReinforceConfig")
+    with closing(open_world(env)) as world:
+        _make_agent(config, world, np.random.default_rng(0))
 
 
 def reinforce(
@@ -363,41 +358,27 @@ def reinforce(
     *,
     episodes: int,
     seeds: Iterable[int],
-    snapshots: Collection[int] = (),
-    progress: Callable[[int, int], object] | None = None,
+    snapshots: Iterable[int] = (),
+    progress: Progress | None = None,
 ) -> Run:
     """Train one policy a seed with REINFORCE.
 
-    Seeds share nothing: a seed gives the same bits alone and among any others.
-
     Parameters
     ----------
-    env : str, gymnasium.Env or callable
-        A Gymnasium id, an environment, or a function that makes one. Acrobot-v1, MountainCar-v0 and
-        MountainCarContinuous-v0, given by id, are played compiled and without time limit; anything
-        else goes through Gymnasium's own `reset` and `step` (`rl_core.episodes.open_environment`).
+    env : str, Make, Task, gymnasium.Env or callable
+        See `rl_core.worlds.environments.open_world`. Acrobot-v1, MountainCar-v0 and
+        MountainCarContinuous-v0 are played compiled and without time limit. An environment that is
+        given ready made is for one seed only, as what it remembers would go from seed to seed.
     config : ReinforceConfig
-    episodes : int
-        Episodes a seed, at least 1.
-    seeds : iterable of int
-        Distinct and non-negative.
-    snapshots : collection of int
-        Episodes, from 0 to `episodes`, after which to keep a copy of the weights. The initial ones,
-        before the first episode, are kept anyway.
-    progress : callable, optional
-        Called now and then with the episodes and environment steps done, over all seeds. A seed
-        that ended early counts with all its episodes.
+    episodes, seeds, snapshots, progress
+        See `rl_core.training.train_seeds`. The initial weights are kept in any case.
 
     Returns
     -------
     Run
-        `table` has the columns `seed`, `episode` (from 1), `steps`, `return` (undiscounted),
-        `terminated` (false: stopped by a cap) and `env_steps` (of this seed so far). Rows of a seed
-        that diverged or used up its budget end there, that episode included.
-        `arrays` holds, with one row a seed, the last weights as `layer0.weight` of shape
-        (seeds, inputs, outputs), `layer0.bias` and so on, `log_sigma` for a Gaussian, and copies
-        under `initial/...` and `episode1000/...`, which are the last weights of seeds that ended
-        before. `failures` names seeds whose weights or returns were no longer finite.
+        Its arrays hold the last weights, those of an MLP as `layer0.weight` of shape (seeds, inputs,
+        outputs), `layer0.bias` and so on, those of a module under its own names, `log_sigma` for a
+        Gaussian, and copies under `initial/...` and `episode1000/...`.
 
     Raises
     ------
@@ -406,75 +387,21 @@ def reinforce(
 
     Examples
     --------
-    >>> config = ReinforceConfig(hidden=(4,), max_episode_steps=200)
+    >>> config = ReinforceConfig(network=MLP((4,)), max_episode_steps=200)
     >>> run = reinforce("Acrobot-v1", config, episodes=2, seeds=[0, 1])
     >>> run.table["episode"].tolist(), run.arrays["layer0.weight"].shape
     ([1, 2, 1, 2], (2, 6, 4))
     """
-    seeds = checked_seeds(seeds)
-    require(isinstance(config, ReinforceConfig), "config", config, "a ReinforceConfig")
-    require(is_integer(episodes, 1), "episodes", episodes, "a positive integer")
-    snapshots = checked_snapshots(snapshots, episodes)
-    allowed = "a function of episodes and steps, or None"
-    require(progress is None or callable(progress), "progress", progress, allowed)
-    trained: list[_Seed] = []
-    for seed in seeds:
-        steps_before = sum(one.env_steps for one in trained)
-        report = partial(_report, progress, len(trained) * episodes, steps_before)
-        environment = open_environment(env)
-        try:
-            policy = _policy(config, environment)
-            trained.append(_train(environment, policy, config, episodes, seed, snapshots, report))
-        finally:
-            environment.close()
-        report(episodes, trained[-1].env_steps)
-    failures = tuple(one.failure for one in trained if one.failure is not None)
-    return Run(_table(trained), _arrays(policy, config, trained, snapshots), failures)
+    check_reinforce(env, config)
 
+    def train(training: Training) -> None:
+        with closing(open_world(env)) as world, modules.reproducible():
+            _train(world, config, training)
 
-def _report(
-    progress: Callable[[int, int], object] | None,
-    episodes_before: int,
-    steps_before: int,
-    episode: int,
-    env_steps: int,
-) -> None:
-    """Add a seed's episodes and steps to those of the seeds before it, and tell `progress`."""
-    if progress is not None:
-        progress(episodes_before + episode, steps_before + env_steps)
-
-
-def _policy(config: ReinforceConfig, environment: Environment) -> Policy:
-    return policies.make_policy(
-        config.policy,
-        config.hidden,
-        environment.n_observations,
-        environment.n_actions,
-        environment.action_dimensions,
+    return train_seeds(
+        train,
+        episodes=episodes,
+        seeds=one_seed_of(env, seeds),
+        snapshots=snapshots,
+        progress=progress,
     )
-
-
-def _table(trained: Sequence[_Seed]) -> pd.DataFrame:
-    """One row an episode, seeds in the order asked for."""
-    tables = []
-    for one in trained:
-        table = pd.DataFrame(one.rows, columns=["steps", "return", "terminated"])
-        table.insert(0, "seed", one.seed)
-        table.insert(1, "episode", np.arange(1, len(table) + 1))
-        table["env_steps"] = table["steps"].cumsum()
-        tables.append(table)
-    return pd.concat(tables, ignore_index=True)
-
-
-def _arrays(
-    policy: Policy, config: ReinforceConfig, trained: Sequence[_Seed], snapshots: Collection[int]
-) -> dict[str, NDArray[np.float32]]:
-    """Weights by name, stacked over seeds: the last, the first, and those of the snapshots."""
-    arrays = {}
-    moments = [f"episode{episode}/" for episode in sorted(set(snapshots) - {0})]
-    for moment in ["", "initial/", *moments]:
-        stacked = np.stack([one.snapshots.get(moment, one.parameters) for one in trained])
-        for name, array in policies.unpack(policy, stacked).items():
-            if config.biases or not name.endswith("bias"):
-                arrays[moment + name] = np.ascontiguousarray(array)
-    return arrays

@@ -25,7 +25,7 @@ from rl_core.checks import (
     one_of,
     require,
 )
-from rl_core.compiled import compiled
+from rl_core.kernels.compiled import compiled
 
 Statistic = Callable[..., Any]
 POINTS_AT_ONCE = 64  # bounds the memory of a bootstrap to 5 MB for 10,000 resamples

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from rl_core.discretise import Discretised, action_levels, binned, cell, make_grid
 from rl_core.exploration import EpsilonGreedy, Evaluation
 from rl_core.q_learning import QLearningConfig, q_learning
+from rl_core.worlds.discretise import Discretised, action_levels, binned, cell, make_grid
 
 BOX = spaces.Box(np.array([-1.0, 0.0], np.float32), np.array([1.0, 3.0], np.float32))
 

@@ -15,13 +15,13 @@ from joblib import Parallel, delayed
 from scipy import stats
 
 from rl_core import epsilon, networks, q_update, replay
-from rl_core.arm import Arm
 from rl_core.dqn import DQNConfig, dqn
 from rl_core.episodes import spawn_streams
 from rl_core.epsilon import Decay, HalfWay
+from rl_core.experiments import Arm
 from rl_core.experiments import run as run_arms
 from rl_core.q_update import COPIES, DUE, NOTHING, Settings, make_learner
-from rl_core.shaping import Shaping, compiled_shape
+from rl_core.worlds.shaping import Shaping, compiled_shape
 
 SMALL = DQNConfig(
     batch_size=40,
@@ -31,14 +31,14 @@ SMALL = DQNConfig(
     max_episode_steps=400,
 )
 CONFIGS = {
-    "Acrobot-v1": dataclasses.replace(SMALL, shaping=Shaping("rl_core.shaping:tip_height")),
+    "Acrobot-v1": dataclasses.replace(SMALL, shaping=Shaping("rl_core.worlds.shaping:tip_height")),
     "MountainCar-v0": dataclasses.replace(
         SMALL,
         optimiser="adam",
         biases=True,
         persistence=7,
         epsilon=Decay(1.0, 0.2, 500),
-        shaping=Shaping("rl_core.shaping:distance_from_start"),
+        shaping=Shaping("rl_core.worlds.shaping:distance_from_start"),
         bootstrap_through_end=True,
     ),
 }
@@ -233,7 +233,7 @@ def test_targets_by_hand_on_a_terminal_a_truncated_and_an_ordinary_transition(th
     _, theta = networks.pack({"layer0.weight": np.array([[1, -1, 3], [0, 5, -2]], np.float32)})
     learner = make_learner((2, 3), theta, biases=True, adam=False, batch_size=3, schedule=0.1)
     memory, following = replay.make_memory(5, 2), np.array([1, 2], np.float32)
-    shape = compiled_shape("rl_core.shaping:original")
+    shape = compiled_shape("rl_core.worlds.shaping:original")
     way = settings(batch_size=3, through_end=through_end)
     for terminated in (True, False, False):  # a truncated step is stored as any other
         q_update.remember(
@@ -345,7 +345,7 @@ def test_the_fixed_network_changes_only_at_copies():
 def test_learning_starts_when_told_and_goes_on_at_the_rate_told():
     way = settings(learning_starts=5, update_every=2)
     learner, memory = learner_of((2, 3), 4), replay.make_memory(10, 2)
-    s, shape = np.zeros(2, np.float32), compiled_shape("rl_core.shaping:original")
+    s, shape = np.zeros(2, np.float32), compiled_shape("rl_core.worlds.shaping:original")
     answers = [
         q_update.remember(way, learner, memory, shape, s, 0, 0.0, s, False) for _ in range(9)
     ]
@@ -598,7 +598,7 @@ CART_POLE = DQNConfig(
     update_every=2,
     copy_every=100,
     epsilon=Decay(1.0, 0.0, 5_000),
-    shaping=Shaping("rl_core.shaping:balance"),
+    shaping=Shaping("rl_core.worlds.shaping:balance"),
     max_env_steps=80_000,
 )
 
@@ -645,7 +645,7 @@ def test_cart_pole_is_solved_through_the_plain_loop():
         ("epsilon", "low"),
         ("epsilon", None),
         ("persistence", 0),
-        ("shaping", "rl_core.shaping:tip_height"),
+        ("shaping", "rl_core.worlds.shaping:tip_height"),
         ("bootstrap_through_end", 0),
         ("max_episode_steps", 0),
         ("max_env_steps", -1),
@@ -667,10 +667,10 @@ def test_a_schedule_out_of_range_is_refused(schedule, changes):
 @pytest.mark.parametrize(
     "function",
     [
-        "rl_core.shaping",
+        "rl_core.worlds.shaping",
         "rl_core.nowhere:f",
-        "rl_core.shaping:nothing",
-        "rl_core.shaping:Shaping",
+        "rl_core.worlds.shaping:nothing",
+        "rl_core.worlds.shaping:Shaping",
         3,
     ],
 )
@@ -724,5 +724,5 @@ def test_environments_with_other_spaces_are_refused():
 def test_a_config_is_plain_data():
     for config in CONFIGS.values():
         assert json.loads(json.dumps(dataclasses.asdict(config)))["gamma"] == 0.99
-    one, two = Shaping("test_dqn:doubled"), Shaping("rl_core.shaping:tip_height")
+    one, two = Shaping("test_dqn:doubled"), Shaping("rl_core.worlds.shaping:tip_height")
     assert one.code != two.code

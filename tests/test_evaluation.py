@@ -4,7 +4,6 @@ import gymnasium
 import numpy as np
 import pytest
 
-from rl_core.discretise import Discretised, binned
 from rl_core.evaluation import (
     Agent,
     as_learned,
@@ -18,6 +17,7 @@ from rl_core.evaluation import (
 from rl_core.policies import Gaussian, Policy
 from rl_core.reinforce import ReinforceConfig
 from rl_core.tabular import spawn_streams
+from rl_core.worlds.discretise import Discretised, binned
 
 PUMP = {"layer0.weight": np.array([[1e-7, 0, -1e-7], [-1, 0, 1]], np.float32)}
 """Push the way the car moves, and to the right from rest: Q(s, a) = (a - 1) (v - 1e-7 x)."""

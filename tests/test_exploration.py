@@ -21,7 +21,7 @@ from rl_core.exploration import (
     step_size,
     values,
 )
-from rl_core.provenance import describe
+from rl_core.identity import describe
 
 UNIT = st.floats(0, 1, exclude_max=True)
 ACTION_VALUES = st.lists(st.floats(-100, 100), min_size=1, max_size=6).map(np.array)

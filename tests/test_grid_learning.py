@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from rl_core.discretise import binned
 from rl_core.evaluation import evaluate_table
 from rl_core.exploration import EpsilonGreedy
 from rl_core.grid_learning import GridConfig, q_learning_on_grid
 from rl_core.q_learning import QLearningConfig
+from rl_core.worlds.discretise import binned
 
 LEARNING = QLearningConfig(
     gamma=0.99, step_size=0.3, exploration=EpsilonGreedy(0.02), max_steps=5_000

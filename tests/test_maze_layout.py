@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rl_core.maze_layout import COURSE_LAYOUT, find, random_layout, read_layout
+from rl_core.worlds.maze_layout import COURSE_LAYOUT, find, random_layout, read_layout
 
 
 def reached_cells(letters: np.ndarray) -> set[tuple[int, int]]:
@@ -83,20 +83,24 @@ def test_every_cell_can_be_anything() -> None:
 @pytest.mark.parametrize(
     ("changes", "error", "message"),
     [
-        ({"rows": 0}, ValueError, "rows must be at least 1, it is 0"),
-        ({"columns": -2}, ValueError, "columns must be at least 1, it is -2"),
-        ({"flags": -1}, ValueError, "flags must be at least 0, it is -1"),
-        ({"flags": 17}, ValueError, "flags must be at most 16, it is 17"),
+        ({"rows": 0}, ValueError, "rows must be an integer from 1, got 0"),
+        ({"columns": -2}, ValueError, "columns must be an integer from 1, got -2"),
+        ({"flags": -1}, ValueError, "flags must be an integer from 0 to 16, got -1"),
+        ({"flags": 17}, ValueError, "flags must be an integer from 0 to 16, got 17"),
         ({"wall_fraction": -0.1}, ValueError, "wall_fraction.*-0.1"),
         ({"wall_fraction": 1.0}, ValueError, "wall_fraction.*1.0"),
         ({"wall_fraction": float("nan")}, ValueError, "wall_fraction.*nan"),
-        ({"wall_fraction": 0.9}, ValueError, "wall_fraction 0.9 leave 2 free.*2 flags need 4"),
-        ({"rows": 1, "columns": 3}, ValueError, "rows 1, columns 3.*leave 2 free"),
-        ({"rows": 2**16, "columns": 2**15}, ValueError, "rows . columns .*below 2..31, it is 2147"),
-        ({"wall_fraction": "0.3"}, TypeError, "wall_fraction must be a number, not str"),
-        ({"rows": 2.0}, TypeError, "rows must be an integer, not float"),
-        ({"flags": "2"}, TypeError, "flags must be an integer, not str"),
-        ({"rng": 0}, TypeError, "rng must be a numpy.random.Generator, not int"),
+        ({"wall_fraction": 0.9}, ValueError, "wall_fraction must be such that 4 cells .*got 2"),
+        (
+            {"rows": 1, "columns": 3},
+            ValueError,
+            "rows, columns and wall_.*2 flags, got 2",
+        ),
+        ({"rows": 2**16, "columns": 2**15}, ValueError, "rows . columns .*below 2..31, got 2147"),
+        ({"wall_fraction": "0.3"}, TypeError, "wall_fraction must be a number .*'0.3'"),
+        ({"rows": 2.0}, TypeError, "rows must be an integer .*2.0"),
+        ({"flags": "2"}, TypeError, "flags must be an integer .*'2'"),
+        ({"rng": 0}, TypeError, "rng must be a numpy.random.Generator, got 0"),
     ],
 )
 def test_impossible_requests_are_named(

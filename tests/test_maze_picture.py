@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rl_core.maze_picture import (
+from rl_core.worlds.maze_picture import (
     BLUE,
     FLOOR,
     GREEN,

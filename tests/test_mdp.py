@@ -1,5 +1,6 @@
 """The MDP: what it accepts, what it refuses and how it says so."""
 
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -98,7 +99,10 @@ def changed(name: str, index: Any, value: Any) -> dict[str, Any]:
             r"probability.*sum to 1.*state 0, action 0 .*0\.75",
         ),
         (changed("probability", (1, 1, 1), 1e-8), r"probability.*sum to 1.*state 1, action 1"),
-        (changed("successor", (0, 0, 1), 2), r"successor.*0\.\.1.*state 0, action 0, slot 1.*2"),
+        (
+            changed("successor", (0, 0, 1), 2),
+            r"successor.*from 0 to 1, at state 0.*it is 2",
+        ),
         (changed("successor", (0, 1, 0), -1), r"successor.*state 0, action 1, slot 0.*-1"),
         (changed("successor", (1, 1, 0), 0), r"successor of a terminal.*state 1, action 1.* 0"),
         (changed("reward", (0, 1, 1), np.inf), r"reward.*finite.*state 0, action 1, slot 1.*inf"),
@@ -107,17 +111,17 @@ def changed(name: str, index: Any, value: Any) -> dict[str, Any]:
             changed("reward", (1, 0, 1), 3.0),
             r"reward of a terminal.*state 1, action 0.* 3\.0",
         ),
-        ({"start_state": [2]}, r"start_state.*0\.\.1.*entry 0 is 2"),
+        ({"start_state": [2]}, r"start_state must be from 0 to 1, entry 0 is 2"),
         ({"start_state": [-1]}, r"start_state.*entry 0 is -1"),
         ({"start_probability": [0.5]}, r"start_probability must sum to 1.*0\.5"),
         ({"start_probability": [1.5]}, r"start_probability.*entry 0 is 1\.5"),
-        ({"start_state": [], "start_probability": []}, r"start_state.*at least 1, not 0 and 0"),
+        ({"start_state": [], "start_probability": []}, r"start_state.*at least 1, got '0 and 0'"),
         ({"start_state": [0, 0]}, r"start_state and start_probability.*2 and 1"),
         ({"terminal": [False]}, r"terminal.*\(2,\).*\(1,\)"),
-        ({"terminal": [0, 1]}, r"terminal.*bool.*int64"),
         ({"reward": np.zeros((2, 2, 1))}, r"reward.*\(2, 2, 2\).*\(2, 2, 1\)"),
-        ({"probability": np.ones((2, 2))}, r"probability.*3 axes.*\(2, 2\)"),
-        ({"successor": np.zeros((2, 2, 2))}, r"successor.*int32.*float64"),
+        ({"probability": np.ones((2, 2))}, r"probability.*numbers with 3 axes"),
+        ({"reward": [[["a"], []]]}, r"reward.*ragged"),
+        ({"reward": None}, r"reward must be an array of numbers of shape \(any, any, any\)"),
         ({"successor": np.full((2, 2, 2), 2**40)}, r"successor.*1099511627776"),
         ({"successor": [[[0], [0, 1]]]}, r"successor.*3 axes"),
         ({"successor": np.zeros((0, 2, 2), dtype=np.int32)}, r"successor.*empty"),
@@ -126,6 +130,26 @@ def changed(name: str, index: Any, value: Any) -> dict[str, Any]:
 def test_what_is_wrong_is_named(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         two_states(**changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"terminal": [0, 1]}, "terminal must be an array of bools with 1 axes, got int64"),
+        ({"successor": np.zeros((2, 2, 2))}, "successor must be an array of integers.*float64"),
+        ({"reward": np.zeros((2, 2, 2), bool)}, "reward must be an array of numbers .*, got bool"),
+        ({"reward": np.full((2, 2, 2), "1")}, "reward must be an array of numbers .*, got <U1"),
+    ],
+)
+def test_arrays_of_the_wrong_type_are_named(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(TypeError, match=message):
+        two_states(**changes)
+
+
+def test_fractions_are_numbers() -> None:
+    third = Fraction(1, 3)
+    model = two_states(probability=[[[third, 2 * third], [1, 0]], [[1, 0], [1, 0]]])
+    assert model.probability[0, 0].tolist() == [1 / 3, 2 / 3]
 
 
 def test_sums_may_miss_1_by_rounding() -> None:

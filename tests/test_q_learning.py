@@ -18,10 +18,10 @@ from rl_core.exploration import (
     UnnormalisedSoftmax,
     VisitDecay,
 )
+from rl_core.identity import describe
 from rl_core.maze import Maze
 from rl_core.mdp import MDP
 from rl_core.planning import optimal_actions, value_iteration
-from rl_core.provenance import describe
 from rl_core.q_learning import QLearningConfig, q_learning, q_learning_on_model
 from rl_core.tabular import spawn_streams
 from rl_core.tabular_record import COLUMNS, make_yardstick, new_appraisal, value_lost

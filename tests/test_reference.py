@@ -13,7 +13,7 @@ from web import docstrings
 
 PAGE = (Path(__file__).parent.parent / "book" / "api.md").read_text()
 LISTED = re.findall(r"^\.\. automodule:: (\S+)$", PAGE, re.MULTILINE)
-MODULES = [f"rl_core.{module.name}" for module in pkgutil.iter_modules(rl_core.__path__)]
+MODULES = [module.name for module in pkgutil.walk_packages(rl_core.__path__, "rl_core.")]
 
 
 def test_every_module_is_listed_once():

@@ -1,12 +1,12 @@
 """Which code a module stands for, and whether a process runs it."""
 
 import importlib
+import os
 import sys
 import textwrap
 
 import pytest
 
-from rl_core import sources
 from rl_core.sources import check_loaded, code
 
 FILES = {
@@ -14,7 +14,7 @@ FILES = {
     "learner.py": """
         from lab import networks            # a module by `from package import`
         from .deep.inner import helper      # relative, into a subpackage
-        from rl_core.run import Run         # another followed package
+        from rl_core.training import Run         # another followed package
         import numpy as np                  # not followed
 
         def learn():
@@ -31,7 +31,7 @@ FILES = {
 }
 INVOLVED = {
     "lab", "lab.learner", "lab.networks", "lab.activations", "lab.lazy", "lab.deep",
-    "lab.deep.inner", "lab.constants", "rl_core", "rl_core.run",
+    "lab.deep.inner", "lab.constants", "rl_core", "rl_core.training",
 }  # fmt: skip
 
 
@@ -82,17 +82,17 @@ def test_a_new_import_is_followed(lab):
     assert set(code(["lab.learner"])) == INVOLVED | {"lab.figures"}
 
 
-def test_a_module_without_package_brings_its_neighbours(lab):
+def test_a_module_without_package_is_followed_to_its_neighbours(lab):
     folder = lab.parent
     (folder / "lone.py").write_text("import neighbour, json\n")
     (folder / "neighbour.py").write_text("from lab import lazy\n")
     importlib.invalidate_caches()
-    assert set(code(["lone"])) == {"lone", "neighbour"}
+    assert set(code(["lone"])) == {"lone", "neighbour", "lab", "lab.lazy"}
 
 
 def test_figures_and_the_machinery_are_not_part_of_an_algorithm():
     involved = set(code(["rl_core.reinforce"]))
-    assert {"rl_core.reinforce", "rl_core.run", "rl_core.compiled"} <= involved
+    assert {"rl_core.reinforce", "rl_core.training", "rl_core.kernels.compiled"} <= involved
     machinery = {"figures", "experiments", "store", "workers", "progress", "statistics"}
     assert not involved & {f"rl_core.{name}" for name in machinery}
 
@@ -101,17 +101,42 @@ def test_what_is_no_python_source_is_left_out():
     assert code(["math", "no_such_module"]) == {}
 
 
-def test_the_process_must_run_what_is_on_disk(lab, monkeypatch):
+def test_the_process_must_run_what_is_on_disk(lab):
+    """Whatever the times of the files are."""
     expected = code(["lab.learner"])
-    monkeypatch.setattr(sources, "_LOADED_AT", float("inf"))  # as if it had started just now
     check_loaded(expected)
-    monkeypatch.undo()
-    monkeypatch.syspath_prepend(lab.parent)
-    with pytest.raises(RuntimeError, match=r"source of lab\S* was changed after this process"):
-        check_loaded(expected)
-    (lab / "lazy.py").write_text("late = 2\n")
-    with pytest.raises(RuntimeError, match=r"source of lab\S* was changed"):
-        check_loaded(expected)
-    monkeypatch.setattr(sources, "_LOADED_AT", float("inf"))
+    path = lab / "lazy.py"
+    old = path.read_text()
+    path.write_text("late = 2\n")
+    os.utime(path, (0, 0))
     with pytest.raises(RuntimeError, match=r"lab.lazy was changed while the experiment ran"):
         check_loaded(expected)
+    with pytest.raises(RuntimeError, match=r"lab.lazy was changed after this process loaded it"):
+        check_loaded(code(["lab.learner"]))
+    path.write_text(f"# as it was\n{old}")
+    os.utime(path, (4e9, 4e9))
+    check_loaded(code(["lab.learner"]))
+
+
+def test_a_module_that_is_loaded_again_is_taken_as_it_then_is(lab):
+    from lab import lazy
+
+    (lab / "lazy.py").write_text("late = 'another value'\n")
+    importlib.reload(lazy)
+    check_loaded(code(["lab.learner"]))
+    assert code(["lab.lazy"], loaded=True) == code(["lab.lazy"])
+    (lab / "lazy.py").write_text("late = 3\n")
+    assert code(["lab.lazy"], loaded=True) != code(["lab.lazy"])
+
+
+def test_projects_are_followed_into_other_folders_and_installed_packages_are_not(
+    lab, tmp_path, monkeypatch
+):
+    for folder, name in (("other", "other_project"), ("site-packages", "installed")):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / f"{name}.py").write_text("A = 1\n")
+        monkeypatch.syspath_prepend(tmp_path / folder)
+    (lab / "lazy.py").write_text("import other_project, installed\nlate = 1\n")
+    importlib.invalidate_caches()
+    assert set(code(["lab.lazy"])) == {"lab", "lab.lazy", "other_project"}
+    assert "installed" in code(["installed"])

@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-import rl_core.store as store_module
-from rl_core.run import Failure
-from rl_core.store import ARRAYS, RECORD, TABLE, DamagedResultError, Store
+import rl_core.experiments.store as store_module
+from rl_core.experiments.store import ARRAYS, RECORD, TABLE, DamagedResultError, Store, scratch
+from rl_core.training import Failure
 
 DIGEST = "0f" * 32
 FILES = [TABLE, ARRAYS, RECORD]
@@ -257,10 +257,22 @@ def test_everything_is_on_the_disk_before_it_gets_its_name(store, monkeypatch):
     assert events[renamed + 1 :] == ["results"]
 
 
-def test_leftovers_are_cleaned_when_they_are_old(store, monkeypatch):
-    old, new = store.scratch(), store.scratch()
-    (old / "table.parquet").write_text("half")
-    os.utime(old, (time.time() - 3600, time.time() - 3600))
-    store.clean()
-    assert not old.exists()
-    assert new.exists()
+def test_leftovers_of_the_dead_are_cleaned_and_the_living_are_left_alone(store, monkeypatch):
+    dead = store.path / "scratch" / "dead"
+    dead.mkdir(parents=True)
+    (dead / "table.parquet").write_text("half")
+    with scratch(store.path / "scratch") as living:
+        os.utime(living, (0, 0))  # whatever the clock says
+        store.clean()
+        assert not dead.exists()
+        assert living.exists()
+    assert not living.exists()
+
+
+def test_where_there_are_no_locks_age_tells(store, monkeypatch):
+    monkeypatch.setattr(store_module, "_fcntl", None)
+    with scratch(store.path / "scratch") as old, scratch(store.path / "scratch") as new:
+        os.utime(old, (time.time() - 3600, time.time() - 3600))
+        store.clean()
+        assert not old.exists()
+        assert new.exists()

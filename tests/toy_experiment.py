@@ -15,9 +15,17 @@ from rl_core.reinforce import ReinforceConfig, reinforce
 SEEDS = [4, 0, 11, 7, 2, 30]
 ARMS = {
     "toy": [
-        Arm(f"step {size}", learn, "toy", ToyConfig(size, diverging=(7,), seconds=0.004), 25, (0,))
+        Arm(
+            f"step {size}",
+            learn,
+            "CartPole-v1",
+            ToyConfig(size, diverging=(7,), seconds=0.004),
+            25,
+            (0,),
+        )
         for size in (0.1, 0.5)
     ],
+    "slow": [Arm("slow", learn, "CartPole-v1", ToyConfig(seconds=0.1), 20)],
     "reinforce": [
         Arm(
             f"gamma {gamma}",
@@ -67,7 +75,7 @@ def fingerprint(results: Results) -> str:
 def main(learner: str, store: str, workers: str) -> None:
     """Run the experiment and print its fingerprint."""
     print("begun", flush=True)
-    results = run(ARMS[learner], seeds=SEEDS, store=Path(store), workers=int(workers), block=1)
+    results = run(ARMS[learner], seeds=SEEDS, store=Path(store), workers=int(workers))
     print(fingerprint(results), flush=True)
 
 

@@ -22,8 +22,8 @@ from drawings.look import (
     label,
 )
 from report.seeds import SEEDS
+from rl_core.evaluation import Weights, mean_actions, state_grid
 from rl_core.reinforce import ReinforceConfig
-from rl_core.rollouts import Weights, mean_actions, state_grid
 from rl_core.statistics import bootstrap_interval
 from studies.continuous import (
     CONVERGED,

@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from drawings.look import BLACK, BLUE, COLOURS, GREY, LINES, ORANGE, SKY_BLUE, VERMILLION, label
-from rl_core.q_networks import action_values
-from rl_core.rollouts import Rollout, Weights
+from rl_core.evaluation import Rollout, Weights, action_values
 from rl_core.statistics import bootstrap_interval
 from studies.dqn import BUDGET, ENV, EPISODES, LEARNED, PARTS, Curves
 

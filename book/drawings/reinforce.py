@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from PIL import Image, ImageDraw, ImageFont
 
 from drawings.look import BLACK, BLUE, COLOURS, GREY, LINES, Film, label
-from rl_core.rollouts import Rollout
+from rl_core.evaluation import Rollout
 from rl_core.statistics import bootstrap_interval
 from studies.reinforce import DRAWN, Curves
 

@@ -6,7 +6,7 @@ import pandas as pd
 
 from rl_core.checks import integer
 from rl_core.experiments import Results
-from rl_core.provenance import LIBRARIES
+from rl_core.experiments.provenance import LIBRARIES
 
 
 def keep(results: Results, folder: Path, *, chapter: int) -> None:

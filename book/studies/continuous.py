@@ -18,9 +18,8 @@ import pandas as pd
 
 from report.claims import Claim, Criterion, Evidence, Finding
 from report.seeds import SEEDS
-from rl_core.arm import Arm
-from rl_core.experiments import Results, run
-from rl_core.policies import Gaussian
+from rl_core.experiments import Arm, Results, run
+from rl_core.policies import MLP, Gaussian
 from rl_core.reinforce import ReinforceConfig, reinforce
 from rl_core.statistics import (
     Interval,
@@ -72,8 +71,7 @@ def config(variant: str) -> ReinforceConfig:
     policy, changes = VARIANTS[variant]
     settings = {
         "gamma": 0.99,
-        "hidden": (10, 20),
-        "biases": False,
+        "network": MLP((10, 20), biases=False),
         "policy": Gaussian(**{"mean": "weights", "sigma": 0.3, **policy}),
         "learning_rate": 2e-3,
         "batch_size": 512,

@@ -7,10 +7,11 @@ import numpy as np
 import pandas as pd
 
 from report.seeds import SEEDS
+from rl_core.evaluation import as_learned, mean_actions, rollout
 from rl_core.experiments import Results
-from rl_core.policies import Gaussian
+from rl_core.policies import MLP, Gaussian
 from rl_core.reinforce import ReinforceConfig
-from rl_core.rollouts import mean_actions, rollout, weights_of
+from rl_core.training import weights_of
 from studies.continuous import ENV, EXTREME, VARIANTS, Curves
 
 FATES = (
@@ -115,14 +116,16 @@ def noise_alone(sigma: float, episodes: int = 100, max_steps: int = 200_000) -> 
 
     Infinite where the car was not out after `max_steps`.
     """
-    settings = ReinforceConfig(hidden=(), policy=Gaussian(mean="direct", sigma=sigma))
+    settings = ReinforceConfig(network=MLP(()), policy=Gaussian(mean="direct", sigma=sigma))
     weights = {
         "layer0.weight": np.zeros((2, 1), np.float32),
         "log_sigma": np.full(1, np.log(sigma), np.float32),
     }
 
+    agent = as_learned(settings, weights)
+
     def play(stream: np.random.SeedSequence) -> float:
-        one = rollout(ENV, settings, weights, np.random.default_rng(stream), max_steps)
+        one = rollout(ENV, agent, np.random.default_rng(stream), max_steps)
         return len(one.rewards) if one.terminated else np.inf
 
     with ThreadPoolExecutor(2) as threads:  # compiled episodes do not hold the interpreter's lock

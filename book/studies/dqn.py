@@ -17,13 +17,11 @@ import pandas as pd
 
 from report.claims import Claim, Criterion, Evidence, Finding
 from report.seeds import SEEDS
-from rl_core.arm import Arm
 from rl_core.dqn import DQNConfig, dqn
-from rl_core.epsilon import Decay
 from rl_core.evaluation import evaluate, of_values
-from rl_core.experiments import Results, run
-from rl_core.rollouts import weights_of
-from rl_core.shaping import Shaping
+from rl_core.experiments import Arm, Results, run
+from rl_core.exploration import Linear
+from rl_core.policies import MLP
 from rl_core.statistics import (
     bootstrap_interval,
     episodes_to_threshold,
@@ -32,6 +30,8 @@ from rl_core.statistics import (
     probability_of_improvement,
     proportion_interval,
 )
+from rl_core.training import weights_of
+from rl_core.worlds.shaping import Shaping
 
 EPISODES = 100  # of figures 12 and 13
 BUDGET = {"Acrobot": 25_000, "MountainCar": 45_000}  # environment steps a seed, for the causes
@@ -40,8 +40,8 @@ ENV = {"Acrobot": "Acrobot-v1", "MountainCar": "MountainCar-v0"}
 CAP = {"Acrobot": 5_000, "MountainCar": 10_000}  # steps an episode, as in 2018
 MEMORY = {"Acrobot": 3_000, "MountainCar": 4_000}
 SHAPING = {
-    "Acrobot": Shaping("rl_core.shaping:tip_height"),
-    "MountainCar": Shaping("rl_core.shaping:distance_from_start"),
+    "Acrobot": Shaping("rl_core.worlds.shaping:tip_height"),
+    "MountainCar": Shaping("rl_core.worlds.shaping:distance_from_start"),
 }
 PARTS = 10  # of a budget, in the curves of steps a goal
 WINDOW = 10  # episodes; "steps at episode k" is a seed's median over the last 10 up to k
@@ -76,9 +76,9 @@ def mended(name: str, rivals: Sequence[str]) -> DQNConfig:
     """The original reward with some of the rival causes of failure mended."""
     changes: dict[str, dict] = {
         "terminal flag": {"bootstrap_through_end": False},
-        "exploration": {"epsilon": Decay(1.0, 0.1, BUDGET[name] // 2), "persistence": 10},
+        "exploration": {"epsilon": Linear(1.0, 0.1, steps=BUDGET[name] // 2), "persistence": 10},
         "long memory": {"memory_size": BUDGET[name]},
-        "biases": {"biases": True},
+        "biases": {"network": MLP()},
     }
     chosen = {key: value for rival in rivals for key, value in changes[rival].items()}
     return replace(_small(name), shaping=None, **chosen)

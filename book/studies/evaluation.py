@@ -16,15 +16,13 @@ from scipy.stats import kendalltau
 
 from report.claims import Claim, Criterion, Evidence, Finding
 from report.seeds import SEEDS
-from rl_core.arm import Arm
-from rl_core.discretise import binned
 from rl_core.evaluation import Agent, as_learned, evaluate, evaluate_table, greedy, of_values
-from rl_core.experiments import Results, run
-from rl_core.exploration import EpsilonGreedy, Evaluation, Linear
-from rl_core.grid_learning import GridConfig, q_learning_on_grid
-from rl_core.q_learning import QLearningConfig
-from rl_core.rollouts import weights_of
+from rl_core.experiments import Arm, Results, run
+from rl_core.exploration import EpsilonGreedy, Linear, Trials
+from rl_core.q_learning import QLearningConfig, q_learning
 from rl_core.statistics import bootstrap_interval, proportion_interval
+from rl_core.training import weights_of
+from rl_core.worlds.discretise import gridded
 from studies import continuous as continuous_study
 from studies import dqn as dqn_study
 from studies import reinforce as reinforce_study
@@ -52,25 +50,24 @@ POINTS = (50, 100, 200, 400, 800)  # grid points a dimension, for the fastest wa
 STARTS = np.linspace(-0.6, -0.4, 401)
 
 
-def table_config(name: str, bins: int, limit: int = TABLE_CAP) -> GridConfig:
+def table_config(name: str, bins: int, limit: int = TABLE_CAP) -> QLearningConfig:
     """Q-learning on a grid, exploring less and less over the first 500 episodes."""
-    learning = QLearningConfig(
+    return QLearningConfig(
         gamma=0.99,
         step_size=0.3,
-        exploration=EpsilonGreedy(Linear(1.0, 0.02, 500)),
+        exploration=EpsilonGreedy(Linear(1.0, 0.02, episodes=500)),
         max_steps=limit,
-        evaluation=Evaluation(every=TABLE_EPISODES, episodes=1, max_steps=1),  # done below
+        evaluation=Trials(every=TABLE_EPISODES, episodes=1, max_steps=1),  # done below
+        bins=bins,
+        levels=LEVELS[name],
     )
-    return GridConfig(bins, LEVELS[name], learning)
 
 
 def table_arm(name: str, bins: int, limit: int = TABLE_CAP) -> Arm:
     """A table on an environment; under a time limit if one is given."""
     under = "" if limit == TABLE_CAP else ", under the limit"
     config = table_config(name, bins, limit)
-    return Arm(
-        f"{name}, table, {bins} bins{under}", q_learning_on_grid, ENV[name], config, TABLE_EPISODES
-    )
+    return Arm(f"{name}, table, {bins} bins{under}", q_learning, ENV[name], config, TABLE_EPISODES)
 
 
 def chosen_bins(name: str) -> int:
@@ -195,7 +192,7 @@ def try_out(one: Tried, results: Results) -> pd.DataFrame:
     tables = []
     if one.arm is None or ", table, " in one.arm:
         bins = 1 if one.arm is None else int(one.arm.split(", table, ")[1].split()[0])
-        world = binned(env, bins, levels=levels)
+        world = gridded(env, bins, levels=levels)
         Q = None if one.arm is None else results.arrays(one.arm)["Q"]
         for i, seed in enumerate(SEEDS):
             values = np.zeros(world.shape) if Q is None else Q[i]
@@ -493,7 +490,7 @@ def gentle(forces: Sequence[float]) -> pd.DataFrame:
     `reached` is the share of episodes that get to the goal: with too little force none does, since
     the wall on the left takes what speed the car has there.
     """
-    world = binned(ENV["MountainCarContinuous"], (1, 2), levels=2)
+    world = gridded(ENV["MountainCarContinuous"], (1, 2), levels=2)
     along = np.array([[1.0, 0.0], [0.0, 1.0]])
     rows = []
     for force in forces:
@@ -577,7 +574,7 @@ def by_bins(costs: dict[str, pd.DataFrame], fewest: dict[str, float]) -> pd.Data
     for name, table in costs.items():
         for bins, seeds in table.groupby("bins"):
             middle, low, high = bootstrap_interval(seeds["steps"].to_numpy(), rng=rng)
-            entries = bins**2 * len(binned(ENV[name], 1, levels=LEVELS[name]).actions)
+            entries = bins**2 * len(gridded(ENV[name], 1, levels=LEVELS[name]).actions)
             rows.append(
                 {
                     "environment": name,

@@ -21,11 +21,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rl_core import dynamics
-from rl_core.compiled import compiled
+from rl_core.checks import floats, integer, one_of, require
+from rl_core.kernels.compiled import compiled
 from rl_core.mdp import MDP
 from rl_core.planning import value_iteration
-from rl_core.policies import is_integer, require
+from rl_core.worlds.tasks import Kernel
+from rl_core.worlds.twins import TASKS
 
 PUSHES = np.array([-1.0, 0.0, 1.0])
 """Full force either way, or none: in the fastest way up there is no use for half of it."""
@@ -82,29 +83,29 @@ def fastest(env: str, positions: NDArray[np.float64], *, points: int) -> Fastest
     [66.0]
     """
     cars = ("MountainCar-v0", "MountainCarContinuous-v0")
-    require(env in cars, "env", env, f"one of {cars}")
-    require(is_integer(points, 2), "points", points, "an integer from 2")
+    task, points = TASKS[one_of("env", env, cars)], integer("points", points, 2, 30_000)
+    positions = floats("positions", positions, (None,))
     valid = bool(((positions >= LOW[0]) & (positions <= HIGH[0])).all())
     require(valid, "positions", positions, f"from {LOW[0]} to {HIGH[0]}")
-    code = dynamics.TASKS[env].code
-    actions = (PUSHES if dynamics.TASKS[env].action_dimensions else PUSHES + 1).astype(np.float32)
+    kernel = task.kernel()
+    actions = (PUSHES if task.action_dimensions else PUSHES + 1).astype(np.float32)
     V = value_iteration(
-        _model(code, actions, points), gamma=GAMMA, tolerance=TOLERANCE, progress=False
+        _model(kernel, actions, points), gamma=GAMMA, tolerance=TOLERANCE, progress=False
     ).V
     starts = np.column_stack([positions, np.zeros(len(positions))])
     values = np.array([_interpolated(V, points, *start) for start in starts])
     planned = np.log1p(values * (1 - GAMMA)) / math.log(GAMMA)
-    driven = np.array([_drive(code, actions, V, points, start) for start in starts])
+    driven = np.array([_drive(kernel, actions, V, points, start) for start in starts])
     return Fastest(points, planned, driven)
 
 
-def _model(code: int, actions: NDArray[np.float32], points: int) -> MDP:
+def _model(kernel: Kernel, actions: NDArray[np.float32], points: int) -> MDP:
     """Return the interpolated model; its last state is the goal."""
     goal = points * points
     shape = (goal + 1, len(actions), 4)
     successor, probability = np.full(shape, goal, np.int32), np.zeros(shape)
     probability[goal, :, 0] = 1.0
-    _fill(code, actions, points, successor, probability)
+    _fill(kernel, actions, points, successor, probability)
     reward = np.full(shape, -1.0)
     reward[goal] = 0.0
     terminal = np.arange(goal + 1) == goal
@@ -113,7 +114,7 @@ def _model(code: int, actions: NDArray[np.float32], points: int) -> MDP:
 
 @compiled
 def _fill(
-    code: int,
+    kernel: Kernel,
     actions: NDArray[np.float32],
     points: int,
     successor: NDArray[np.int32],
@@ -126,7 +127,7 @@ def _fill(
             state[0] = LOW[0] + (HIGH[0] - LOW[0]) * (s // points) / (points - 1)
             state[1] = LOW[1] + (HIGH[1] - LOW[1]) * (s % points) / (points - 1)
             state[2] = 0.0
-            _, arrived = dynamics.step(code, state, actions[a : a + 1])
+            _, arrived = kernel.step(state, actions[a : a + 1])
             if arrived:
                 probability[s, a, 0] = 1.0
             else:
@@ -166,7 +167,7 @@ def _interpolated(V: NDArray[np.float64], points: int, position: float, velocity
 
 @compiled
 def _drive(
-    code: int,
+    kernel: Kernel,
     actions: NDArray[np.float32],
     V: NDArray[np.float64],
     points: int,
@@ -179,7 +180,7 @@ def _drive(
         highest = -np.inf
         for a in range(len(actions)):
             trial[:] = state
-            _, arrived = dynamics.step(code, trial, actions[a : a + 1])
+            _, arrived = kernel.step(trial, actions[a : a + 1])
             if arrived:
                 return t + 1.0
             value = _interpolated(V, points, trial[0], trial[1])

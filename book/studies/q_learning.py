@@ -11,8 +11,7 @@ import pandas as pd
 
 from report.claims import Claim, Criterion, Evidence, Finding
 from report.seeds import SEEDS
-from rl_core.arm import Arm
-from rl_core.experiments import Results
+from rl_core.experiments import Arm, Results
 from rl_core.exploration import EpsilonGreedy, Linear, Softmax, UnnormalisedSoftmax, VisitDecay
 from rl_core.q_learning import QLearningConfig, q_learning_on_model
 from rl_core.statistics import bootstrap_interval

@@ -15,8 +15,8 @@ import pandas as pd
 from report.claims import Claim, Criterion, Evidence, Finding
 from report.figure_data import tidy
 from report.seeds import SEEDS
-from rl_core.arm import Arm
-from rl_core.experiments import Results, run
+from rl_core.experiments import Arm, Results, run
+from rl_core.policies import MLP
 from rl_core.reinforce import ReinforceConfig, reinforce
 from rl_core.statistics import (
     bootstrap_interval,
@@ -45,7 +45,7 @@ ENVIRONMENTS = {
 VARIANTS = {
     "as reported": {},
     "gamma 0.9": {"gamma": 0.9},
-    "one hidden layer": {"hidden": (10,)},
+    "one hidden layer": {"network": MLP((10,))},
     "raw returns": {"normalise": "none"},
 }
 

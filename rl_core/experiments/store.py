@@ -1,0 +1,351 @@
+"""The result store: each result under the digest of what made it, in Parquet and JSON.
+
+A result is one seed of one arm, in a folder of its own, named by its digest:
+
+    results/<digest>/table.parquet    the tidy table
+    results/<digest>/arrays.parquet   what was learned: one row, one column an array, flattened
+    results/<digest>/record.json      failures, provenance, and the checksum of every file
+    scratch/                          folders being written, each locked by its writer
+
+A result appears whole or not at all: its folder is written in `scratch`, flushed to the disk, and
+then renamed. Every byte is under a checksum, so damage is found when a result is read. Several
+processes may use one store at once.
+"""
+
+import contextlib
+import hashlib
+import importlib
+import json
+import os
+import shutil
+import time
+import uuid
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from rl_core.training import Failure
+
+_fcntl: Any = importlib.import_module("fcntl") if os.name == "posix" else None
+
+TABLE, ARRAYS, RECORD = "table.parquet", "arrays.parquet", "record.json"
+STALE_SECONDS = 600.0  # of what cannot be locked
+
+
+class DamagedResultError(Exception):
+    """A stored file is not what was written; the message names it."""
+
+
+@dataclass(frozen=True)
+class Stored:
+    """What the store holds of one seed, without its arrays.
+
+    Attributes
+    ----------
+    table : pandas.DataFrame
+        The seed's rows.
+    failures : tuple of Failure
+        Empty, or the one failure of the seed.
+    provenance : dict
+        What made it, where and when, in terms of JSON.
+    """
+
+    table: pd.DataFrame
+    failures: tuple[Failure, ...]
+    provenance: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Store:
+    """A folder of results.
+
+    Attributes
+    ----------
+    path : Path
+        Where it is. It is made when the first result is written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     store = Store(Path(folder))
+    ...     table = pd.DataFrame({"seed": [7], "episode": [1], "steps": [93]})
+    ...     store.write("ab12", table, {"weights": np.zeros((2, 3))}, (), {"seed": 7})
+    ...     stored, arrays = store.read("ab12"), store.read_arrays("ab12")
+    >>> stored.table.steps.tolist(), arrays["weights"].shape, store.read("cd34")
+    ([93], (2, 3), None)
+    """
+
+    path: Path
+
+    def write(
+        self,
+        digest: str,
+        table: pd.DataFrame,
+        arrays: Mapping[str, NDArray[Any]],
+        failures: Sequence[Failure],
+        provenance: Mapping[str, Any],
+    ) -> None:
+        """Store a result under `digest`, atomically.
+
+        An intact result that is already there (another process made it) stays; a damaged one is
+        replaced.
+
+        Raises
+        ------
+        TypeError
+            An array is neither of numbers nor of truth values.
+        """
+        files = {
+            TABLE: _parquet(pa.Table.from_pandas(table, preserve_index=False)),
+            ARRAYS: _parquet(_flattened(arrays)),
+        }
+        record = {
+            "digest": digest,
+            "files": {name: hashlib.sha256(data).hexdigest() for name, data in files.items()},
+            "arrays": {
+                name: {"dtype": array.dtype.str, "shape": list(array.shape)}
+                for name, array in arrays.items()
+            },
+            "failures": [asdict(failure) for failure in failures],
+            "provenance": dict(provenance),
+        }
+        with scratch(self.path / "scratch") as folder:
+            for name, data in {**files, RECORD: _sealed(record)}.items():
+                _write_flushed(folder / name, data)
+            _flush(folder)
+            self._place(folder, digest)
+
+    def read(self, digest: str) -> Stored | None:
+        """Return the result under `digest`, all of its files verified, or None if there is none.
+
+        Raises
+        ------
+        DamagedResultError
+            A file is missing or is not the one that was written.
+        """
+        found = self._verified(digest)
+        if found is None:
+            return None
+        record, files = found
+        return Stored(
+            table=_columns(files[TABLE]).to_pandas(use_threads=False),
+            failures=tuple(Failure(**failure) for failure in record["failures"]),
+            provenance=record["provenance"],
+        )
+
+    def read_arrays(self, digest: str) -> dict[str, NDArray[Any]]:
+        """Return the arrays of the result under `digest`, bit for bit as they were written.
+
+        Raises
+        ------
+        KeyError
+            There is no such result.
+        DamagedResultError
+            A file is missing or is not the one that was written.
+        """
+        found = self._verified(digest)
+        if found is None:
+            raise KeyError(f"no result {digest} in the store")
+        record, files = found
+        columns = _columns(files[ARRAYS])
+        return {
+            name: _unflattened(columns[name], form["dtype"], form["shape"])
+            for name, form in record["arrays"].items()
+        }
+
+    def provenances(self) -> list[dict[str, Any]]:
+        """Return the provenance of every result whose record is intact, tables not looked at."""
+        found = []
+        for folder in sorted((self.path / "results").glob("*")):
+            try:
+                record = _unsealed(folder / RECORD)
+            except (DamagedResultError, FileNotFoundError):
+                continue
+            found.append(record["provenance"])
+        return found
+
+    def clean(self) -> None:
+        """Remove what killed writers left behind."""
+        sweep(self.path / "scratch", "*")
+
+    def _verified(self, digest: str) -> tuple[dict[str, Any], dict[str, bytes]] | None:
+        """Return the record and the Parquet files of a result, each checked against its checksum.
+
+        What is parsed later are these very bytes.
+        """
+        folder = self.path / "results" / digest
+        if not folder.exists():
+            return None
+        try:
+            record = _unsealed(folder / RECORD)
+            files = {name: (folder / name).read_bytes() for name in (TABLE, ARRAYS)}
+        except OSError as error:
+            raise DamagedResultError(f"{error.filename}: {error.strerror}") from error
+        if record["digest"] != digest:
+            raise DamagedResultError(f"{folder / RECORD}: tells of the result {record['digest']}")
+        for name, data in files.items():
+            if hashlib.sha256(data).hexdigest() != record["files"][name]:
+                raise DamagedResultError(f"{folder / name}: does not match its checksum")
+        return record, files
+
+    def _place(self, folder: Path, digest: str) -> None:
+        """Rename a finished folder into `results`, unless an intact result is there."""
+        target = self.path / "results" / digest
+        target.parent.mkdir(parents=True, exist_ok=True)
+        while True:
+            try:
+                os.rename(folder, target)  # fails if there is a folder with files in it
+                break
+            except OSError:
+                if not target.exists():
+                    raise
+            try:
+                if self._verified(digest) is not None:
+                    return
+            except DamagedResultError:
+                self._discard(target)
+        _flush(target.parent)
+
+    def _discard(self, target: Path) -> None:
+        """Move a damaged result out of the way at once, then remove its files."""
+        with scratch(self.path / "scratch") as away, contextlib.suppress(FileNotFoundError):
+            os.rename(target, away / "damaged")  # unless another process was quicker
+
+
+@contextlib.contextmanager
+def scratch(parent: Path, prefix: str = "") -> Iterator[Path]:
+    """Make an empty folder, locked until the block ends; then remove it, unless it was renamed.
+
+    The lock goes with the process, however that ends, so that `sweep` can tell the dead.
+    """
+    parent.mkdir(parents=True, exist_ok=True)
+    lock = None
+    while lock is None:  # a sweep may take a folder that is not locked yet
+        folder = parent / f"{prefix}{uuid.uuid4().hex}"
+        folder.mkdir()
+        lock = _locked(folder)
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        if lock >= 0:
+            os.close(lock)
+
+
+def sweep(parent: Path, pattern: str) -> None:
+    """Remove the folders of that kind whose makers are dead."""
+    for folder in parent.glob(pattern):
+        lock = _locked(folder)
+        if lock is None:
+            continue
+        with contextlib.suppress(FileNotFoundError):  # another process was quicker
+            if lock >= 0 or time.time() - folder.stat().st_mtime > STALE_SECONDS:
+                shutil.rmtree(folder, ignore_errors=True)
+        if lock >= 0:
+            os.close(lock)
+
+
+def _locked(folder: Path) -> int | None:
+    """Return the handle of the lock on a folder, None if another has it or the folder is gone.
+
+    -1 where there are no such locks (Windows, some network drives): there, age has to tell.
+    """
+    if _fcntl is None:
+        return -1
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except FileNotFoundError:
+        return None
+    except OSError:
+        return -1
+    try:
+        _fcntl.flock(handle, _fcntl.LOCK_EX | _fcntl.LOCK_NB)
+    except OSError as error:
+        os.close(handle)
+        return None if isinstance(error, BlockingIOError) else -1
+    if folder.exists():
+        return handle
+    os.close(handle)
+    return None
+
+
+def _flattened(arrays: Mapping[str, NDArray[Any]]) -> pa.Table:
+    """Return a table with one row and, for each array, a column that lists its elements."""
+    columns = {}
+    for name, array in arrays.items():
+        dtype = array.dtype
+        if dtype.kind not in "biuf" or dtype.itemsize > 8 or not dtype.isnative:
+            raise TypeError(
+                f"array {name!r} has dtype {dtype}; allowed are bool, integers and floats of up to "
+                "64 bits in the machine's byte order"
+            )
+        elements = pa.array(np.ascontiguousarray(array).reshape(-1))
+        columns[name] = pa.ListArray.from_arrays([0, len(elements)], elements)
+    return pa.table(columns)
+
+
+def _unflattened(column: pa.ChunkedArray, dtype: str, shape: Sequence[int]) -> NDArray[Any]:
+    elements: NDArray[Any] = column.combine_chunks().values.to_numpy(zero_copy_only=False)
+    return elements.astype(dtype, copy=True).reshape(shape)
+
+
+def _parquet(table: pa.Table) -> bytes:
+    """Return `table` as a Parquet file."""
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, compression="zstd")
+    data: bytes = sink.getvalue().to_pybytes()
+    return data
+
+
+def _columns(data: bytes) -> pa.Table:
+    """Read a Parquet file in this thread alone.
+
+    Arrow's threads may let go of `data` only when Python shuts down, which aborts the process
+    (https://github.com/apache/arrow/issues/34314).
+    """
+    return pq.ParquetFile(pa.BufferReader(data), pre_buffer=False).read(use_threads=False)
+
+
+def _sealed(record: Mapping[str, Any]) -> bytes:
+    """Return `record` as a JSON file that starts with the record's own checksum."""
+    text = json.dumps(record, sort_keys=True, allow_nan=False)
+    checksum = hashlib.sha256(text.encode()).hexdigest()
+    return json.dumps({"checksum": checksum, "record": record}, sort_keys=True, indent=1).encode()
+
+
+def _unsealed(path: Path) -> dict[str, Any]:
+    """Return the record in a JSON file, if the file is byte for byte the one that was written."""
+    data = path.read_bytes()
+    try:
+        record: dict[str, Any] = json.loads(data)["record"]
+        intact = _sealed(record) == data
+    except (ValueError, KeyError, TypeError):
+        intact = False
+    if not intact:
+        raise DamagedResultError(f"{path}: does not match its checksum")
+    return record
+
+
+def _write_flushed(path: Path, data: bytes) -> None:
+    with path.open("wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _flush(folder: Path) -> None:
+    """Make the names in `folder` last through a power failure, where the system can do that."""
+    if os.name == "posix":
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)

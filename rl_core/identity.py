@@ -1,0 +1,127 @@
+"""What tells one value from another: its one description in JSON, and the digest of that.
+
+Results are kept under a digest of everything that decides their bits. A configuration, or what an
+environment is registered with, comes into it through `describe`.
+"""
+
+import dataclasses
+import hashlib
+import json
+import math
+import sys
+from collections.abc import Mapping
+from functools import reduce
+from typing import Any
+
+import numpy as np
+
+
+def canonical_json(value: object) -> str:
+    """Return the one way `value` is written as JSON: sorted keys, no spaces, no NaN.
+
+    Examples
+    --------
+    >>> from rl_core.identity import canonical_json
+    >>> canonical_json({"b": 1.0, "a": [True, None]})
+    '{"a":[true,null],"b":1.0}'
+    """
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def digest(value: object) -> str:
+    """Return the SHA-256 of the canonical JSON of `value`, in hexadecimal.
+
+    Examples
+    --------
+    >>> from rl_core.identity import digest
+    >>> digest({"seed": 1})[:8] != digest({"seed": 2})[:8]
+    True
+    """
+    return hashlib.sha256(canonical_json(value).encode()).hexdigest()
+
+
+def import_path(name: str, thing: object, allowed: str = "a class or function") -> str:
+    """Return where `thing` is found by import, as "module:attribute".
+
+    Raises
+    ------
+    TypeError
+        It is not found there: it was made in `__main__`, within a function, or by a lambda.
+
+    Examples
+    --------
+    >>> from rl_core.identity import import_path
+    >>> import_path("rule", canonical_json)
+    'rl_core.identity:canonical_json'
+    """
+    module = getattr(thing, "__module__", None)
+    path = getattr(thing, "__qualname__", "")
+    try:
+        found: object = reduce(getattr, path.split("."), sys.modules[str(module)])
+    except (KeyError, AttributeError):
+        found = None
+    if found is not thing or module == "__main__" or not callable(thing):
+        raise TypeError(
+            f"{name} must be {allowed} at the top of a module that can be imported (put it "
+            f"into a file of its own), got {thing!r}"
+        )
+    return f"{module}:{path}"
+
+
+def describe(value: object, name: str = "config", modules: set[str] | None = None) -> Any:
+    """Return `value`, a configuration, in terms of JSON, with the classes of its dataclasses.
+
+    Parameters
+    ----------
+    value : object
+        Dataclasses, lists, tuples, dicts with string keys, classes and functions that can be
+        imported, str, int, float, bool and None, nested at will; numpy's scalars count as Python's.
+        Infinities and NaN are written as text.
+    name : str
+        What an error calls `value`.
+    modules : set of str, optional
+        Takes the modules of all classes and functions met.
+
+    Raises
+    ------
+    TypeError
+        Any other type: the digest could not tell two of its values apart.
+
+    Examples
+    --------
+    >>> from rl_core.identity import describe
+    >>> from rl_core.training import Failure
+    >>> describe(Failure(seed=3, episode=1, reason="NaN"))["class"]
+    'Failure'
+    """
+    if isinstance(value, np.generic):
+        value = value.item()
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        module, _, path = _place(name, type(value), modules)
+        fields = {
+            field.name: describe(getattr(value, field.name), f"{name}.{field.name}", modules)
+            for field in dataclasses.fields(value)
+        }
+        return {"class": path, "from": module, **fields}  # no field can be called so
+    if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
+        return {key: describe(item, f"{name}[{key!r}]", modules) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [describe(item, f"{name}[{i}]", modules) for i, item in enumerate(value)]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else {"float": repr(float(value))}
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if callable(value) and hasattr(value, "__qualname__"):
+        module, _, path = _place(name, value, modules)
+        return {"import": path, "from": module}
+    raise TypeError(
+        f"{name} must be made of dataclasses, lists, tuples, dicts with string keys, classes, "
+        f"functions, str, int, float, bool and None, got {value!r} of type {type(value).__name__}"
+    )
+
+
+def _place(name: str, thing: object, modules: set[str] | None) -> tuple[str, str, str]:
+    module, colon, path = import_path(name, thing).partition(":")
+    if modules is not None:
+        modules.add(module)
+    return module, colon, path

@@ -1,0 +1,121 @@
+"""One place decides how hot loops are compiled and where their machine code is kept."""
+
+import contextlib
+import hashlib
+import io
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar, cast
+
+import numba
+from numba.core import caching
+
+from rl_core import sources
+
+_Arguments = ParamSpec("_Arguments")
+_Result = TypeVar("_Result")
+
+# Without these, numba is not typed.
+_settings: Any = numba.config
+_FunctionCache: Any = caching.FunctionCache
+_CacheFiles: Any = caching.IndexDataCacheFile
+
+SWITCHES = (
+    "BOUNDSCHECK", "CPU_FEATURES", "CPU_NAME", "DISABLE_INTEL_SVML", "DISABLE_JIT", "ENABLE_AVX",
+    "LOOP_VECTORIZE", "OPT", "SLP_VECTORIZE",
+)  # fmt: skip
+"""The settings of numba (`NUMBA_...`) that may change what a kernel returns."""
+
+
+def compiled(function: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]:
+    """Compile `function` with numba, keeping its type signature for readers and type checkers.
+
+    Floating point is strict (no `fastmath`), because a run has to give the same bits every time;
+    the interpreter lock is released.
+
+    The machine code is cached where numba would keep it: in the folder that `NUMBA_CACHE_DIR`
+    names, else beside the module, else in the user's cache. Where none of them can be written, and
+    for functions of `__main__` (a notebook's cells), every process compiles anew.
+
+    Parameters
+    ----------
+    function : callable
+        In the part of Python that numba compiles.
+
+    Examples
+    --------
+    >>> from rl_core.kernels.compiled import compiled
+    >>> @compiled
+    ... def add(a: int, b: int) -> int:
+    ...     return a + b
+    >>> add(1, 2)
+    3
+    """
+    kernel: Any = numba.njit(nogil=True, error_model="numpy")(function)
+    code = sources.loaded_code(function.__module__)
+    if code and not _settings.DISABLE_JIT:
+        # RuntimeError: no folder can be written. ValueError: its name cannot be encoded.
+        with contextlib.suppress(RuntimeError, ValueError, OSError):
+            kernel._cache = _KernelCache(function, code)
+    return cast(Callable[_Arguments, _Result], kernel)
+
+
+def switches() -> dict[str, str]:
+    """Return the settings of numba that may change what a kernel returns.
+
+    Examples
+    --------
+    >>> from rl_core.kernels.compiled import switches
+    >>> sorted(switches()) == sorted(SWITCHES)
+    True
+    """
+    return {name: str(getattr(_settings, name, None)) for name in SWITCHES}
+
+
+class _KernelCache(_FunctionCache):  # type: ignore[misc]
+    """numba's cache of a function, with a stamp of all that its machine code was made from.
+
+    A kernel contains the kernels it calls. numba itself looks at the kernel's own file only, and
+    would go on using machine code after an edit to a module it imports.
+    """
+
+    def __init__(self, function: Callable[..., object], code: object) -> None:
+        super().__init__(function)
+        stamp = hashlib.sha256(repr((code, switches())).encode()).hexdigest()
+        self._cache_file = _CheckedFiles(self._cache_path, self._impl.filename_base, stamp)
+
+    def save_overload(self, sig: object, data: object) -> None:
+        """Keep the machine code, unless the disk is full or no longer to be written."""
+        with contextlib.suppress(OSError):
+            super().save_overload(sig, data)
+
+
+class _CheckedFiles(_CacheFiles):  # type: ignore[misc]
+    """numba's files, each followed by a checksum of its content and the stamp.
+
+    What is damaged, or left by a process that was killed between two files, counts as absent.
+    """
+
+    @contextlib.contextmanager
+    def _open_for_write(self, filepath: str) -> Iterator[io.BytesIO]:
+        content = io.BytesIO()
+        with super()._open_for_write(filepath) as file:
+            yield content
+            file.write(content.getvalue() + self._checksum(content.getvalue()))
+
+    def _load_index(self) -> dict[object, str]:
+        found: dict[object, str] = super()._load_index() if self._intact(self._index_path) else {}
+        return found
+
+    def _load_data(self, name: str) -> object:
+        return super()._load_data(name) if self._intact(self._data_path(name)) else None
+
+    def _intact(self, path: str) -> bool:
+        try:
+            data = Path(path).read_bytes()
+        except OSError:
+            return False
+        return self._checksum(data[:-32]) == data[-32:]
+
+    def _checksum(self, content: bytes) -> bytes:
+        return hashlib.sha256(self._source_stamp.encode() + content).digest()

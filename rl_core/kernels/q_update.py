@@ -1,0 +1,297 @@
+"""One update of a deep Q-network, compiled: move the network towards its targets.
+
+The network Q(s, a; theta) puts out one value an action. A batch B of remembered transitions has the
+targets
+
+    y = r + gamma max_a' Q(s', a'; theta-)        if s' is not terminal,
+    y = r                                         if it is,
+
+with the parameters theta- of a fixed network, which are those of theta at the last copy. Then
+
+    L(theta) = 1 / |B| sum_B (y - Q(s, a; theta))^2
+
+is descended by one step of RMSProp or Adam. `through_end` leaves the terminal case out, as the 2018
+program did, which kept no terminal flag.
+
+`rl_core.dqn` states the same in torch. Everything here acts on one seed's arrays in place.
+
+Source: V. Mnih et al. (2015), Human-level control through deep reinforcement learning, algorithm 1.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rl_core.kernels import choices, networks
+from rl_core.kernels.compiled import compiled
+from rl_core.kernels.replay import Memory
+
+STEPS, UPDATES, COPIES, KEPT, ACTION = range(5)
+"""Entries of `Learner.counts`; for `KEPT` more steps the random `ACTION` is kept."""
+
+
+class Settings(NamedTuple):
+    """The part of the config that the compiled code reads; see `rl_core.dqn.DQNConfig`."""
+
+    gamma: float
+    batch_size: int
+    learning_starts: int
+    update_every: int
+    copy_every: int
+    persistence: int
+    learning_rate: float
+    adam: bool
+    through_end: bool
+    n_actions: int
+
+
+class Learner(NamedTuple):
+    """What one seed learns, and the room it works in.
+
+    Attributes
+    ----------
+    sizes : int64 array of shape (L + 1,)
+        Widths of the network.
+    parameters, fixed : float32 arrays of shape (P,)
+        theta and theta-.
+    trainable : float32 array of shape (P,)
+        Ones where a parameter learns.
+    first, second : float32 arrays of shape (P,)
+        The optimiser's moments; RMSProp uses `second` only.
+    counts : int64 array of shape (5,)
+        Environment steps, updates and copies so far, and the random action that is kept.
+    epsilon : float64 array
+        State of the schedule (`rl_core.kernels.choices`).
+    units, deltas : float32 arrays of shape (sum(sizes), padded batch)
+    gradient : float32 array of shape (P,)
+    slots, stale : int64 arrays of shape (batch,)
+        The sampled batch, and scratch space, like the three above and the next.
+    one : float32 array of shape (sum(sizes),)
+    settings : Settings
+    """
+
+    sizes: NDArray[np.int64]
+    parameters: NDArray[np.float32]
+    fixed: NDArray[np.float32]
+    trainable: NDArray[np.float32]
+    first: NDArray[np.float32]
+    second: NDArray[np.float32]
+    counts: NDArray[np.int64]
+    epsilon: NDArray[np.float64]
+    units: NDArray[np.float32]
+    deltas: NDArray[np.float32]
+    gradient: NDArray[np.float32]
+    slots: NDArray[np.int64]
+    stale: NDArray[np.int64]
+    one: NDArray[np.float32]
+    settings: Settings
+
+
+def make_learner(
+    sizes: tuple[int, ...],
+    parameters: NDArray[np.float32],
+    settings: Settings,
+    epsilon: NDArray[np.float64],
+    *,
+    biases: bool,
+) -> Learner:
+    """Make the learner of one seed; it changes `parameters` in place.
+
+    Parameters
+    ----------
+    sizes : tuple of int
+        Widths of the network, from the observation's to the number of actions.
+    parameters : float32 array of shape (P,)
+        theta to begin with (`rl_core.networks`).
+    settings : Settings
+    epsilon : float64 array
+        State of the schedule of epsilon.
+    biases : bool
+        Whether biases are learned.
+
+    Examples
+    --------
+    >>> theta = networks.xavier_uniform((2, 4, 3), np.random.default_rng(0))
+    >>> way = Settings(0.9, 512, 1, 1, 10, 1, 1e-3, True, False, 3)
+    >>> learner = make_learner((2, 4, 3), theta, way, np.zeros(6), biases=False)
+    >>> learner.units.shape
+    (9, 512)
+    """
+    shape = (sum(sizes), networks.padded(settings.batch_size))
+    # TensorFlow 1, which the 2018 program ran on, starts the mean squares of RMSProp at one.
+    second = np.zeros_like(parameters) if settings.adam else np.ones_like(parameters)
+    return Learner(
+        np.array(sizes),
+        parameters,
+        parameters.copy(),
+        networks.trainable_mask(sizes, biases),
+        np.zeros_like(parameters),
+        second,
+        np.zeros(5, np.int64),
+        epsilon,
+        np.zeros(shape, np.float32),
+        np.zeros(shape, np.float32),
+        np.empty_like(parameters),
+        np.empty(settings.batch_size, np.int64),
+        np.empty(settings.batch_size, np.int64),
+        np.empty(sum(sizes), np.float32),
+        settings,
+    )
+
+
+@compiled
+def q_values(learner: Learner, observation: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Q(s, .; theta) of one state, float64 of shape (A,)."""
+    units = learner.one
+    for i in range(observation.size):
+        units[i] = observation[i]
+    networks.forward_one(learner.sizes, learner.parameters, units)
+    return units[units.size - learner.sizes[-1] :].astype(np.float64)
+
+
+@compiled
+def _next_values(learner: Learner, memory: Memory) -> None:
+    """See to it that V = max_a' Q(s', a'; theta-) is up to date in the sampled slots."""
+    n_in, n_out = learner.sizes[0], learner.sizes[-1]
+    units, count = learner.units, 0
+    for slot in learner.slots:
+        if memory.stamps[slot] != learner.counts[COPIES]:
+            memory.stamps[slot] = learner.counts[COPIES]
+            learner.stale[count] = slot
+            for i in range(n_in):
+                units[i, count] = memory.next_observations[slot, i]
+            count += 1
+    if count == 0:
+        return
+    networks.forward(learner.sizes, learner.fixed, units, networks.padded(count))
+    values = units[len(units) - n_out :]
+    for k in range(count):
+        highest = values[0, k]
+        for a in range(1, n_out):
+            highest = max(highest, values[a, k])
+        memory.next_values[learner.stale[k]] = highest
+
+
+@compiled
+def target(settings: Settings, memory: Memory, slot: int) -> float:
+    """The target y of the transition in a slot, whose V is up to date.
+
+    Parameters
+    ----------
+    settings : Settings
+        gamma, and whether to bootstrap through the end.
+    memory : Memory
+    slot : int
+
+    Examples
+    --------
+    >>> way = Settings(0.9, 2, 1, 1, 10, 1, 1e-3, True, False, 3)
+    >>> memory, s = replay.make_memory(5, 2), np.ones(2, np.float32)
+    >>> for end in (False, True):
+    ...     replay.store(memory, s, 0, -1.0, s, end)
+    >>> memory.next_values[:2] = 10.0
+    >>> target(way, memory, 0), target(way, memory, 1)
+    (8.0, -1.0)
+    """
+    if memory.ends[slot] and not settings.through_end:
+        return float(memory.rewards[slot])
+    return float(memory.rewards[slot] + settings.gamma * memory.next_values[slot])
+
+
+@compiled
+def loss_gradient(learner: Learner, memory: Memory) -> float:
+    """L(theta) of the sampled batch; its gradient is left in `learner.gradient`.
+
+    Parameters
+    ----------
+    learner : Learner
+        Its `slots` say which transitions; `units`, `deltas` and `gradient` are overwritten.
+    memory : Memory
+        Its cache of V is brought up to date where it is read.
+
+    Examples
+    --------
+    >>> way = Settings(0.9, 2, 1, 1, 10, 1, 1e-3, True, False, 3)
+    >>> theta = np.zeros(9, np.float32)
+    >>> learner = make_learner((2, 3), theta, way, np.zeros(6), biases=False)
+    >>> memory, s = replay.make_memory(5, 2), np.ones(2, np.float32)
+    >>> for reward in (-1.0, -3.0):
+    ...     replay.store(memory, s, 0, reward, s, False)
+    >>> learner.slots[:] = 0, 1
+    >>> loss_gradient(learner, memory)  # (1 + 9) / 2
+    5.0
+    >>> learner.gradient[:3]  # of both inputs' weights to action 0: (2 (1) + 2 (3)) / 2
+    array([4., 4., 0.], dtype=float32)
+    """
+    n, n_padded = learner.slots.size, networks.padded(learner.slots.size)
+    n_in, n_out = learner.sizes[0], learner.sizes[-1]
+    units, deltas = learner.units, learner.deltas
+    _next_values(learner, memory)
+    for k in range(n):
+        for i in range(n_in):
+            units[i, k] = memory.observations[learner.slots[k], i]
+    networks.forward(learner.sizes, learner.parameters, units, n_padded)
+    values, delta = units[len(units) - n_out :], deltas[len(units) - n_out :]
+    delta[:] = 0.0
+    loss = 0.0
+    for k in range(n):
+        slot = learner.slots[k]
+        action = memory.actions[slot]
+        error = values[action, k] - target(learner.settings, memory, slot)
+        delta[action, k] = 2.0 / n * error
+        loss += error * error / n
+    networks.backward(learner.sizes, learner.parameters, units, deltas, learner.gradient, n_padded)
+    return loss
+
+
+@compiled
+def update(learner: Learner, memory: Memory) -> bool:
+    """Take one step of the optimiser on the sampled batch; copy the network when it is time.
+
+    Parameters
+    ----------
+    learner : Learner
+        Its `slots` say which transitions.
+    memory : Memory
+
+    Returns
+    -------
+    bool
+        False if the loss is not finite; then nothing is changed.
+
+    Examples
+    --------
+    >>> way = Settings(0.9, 2, 1, 1, 1, 1, 1e-3, True, False, 3)  # Adam, a copy at each update
+    >>> theta = np.zeros(9, np.float32)
+    >>> learner = make_learner((2, 3), theta, way, np.zeros(6), biases=False)
+    >>> memory, s = replay.make_memory(5, 2), np.ones(2, np.float32)
+    >>> replay.store(memory, s, 0, -1.0, s, False)
+    >>> learner.slots[:] = 0
+    >>> update(learner, memory)
+    True
+    >>> learner.parameters[:3].round(4), int(learner.counts[COPIES])
+    (array([-0.001, -0.001,  0.   ], dtype=float32), 1)
+    """
+    if not math.isfinite(loss_gradient(learner, memory)):
+        return False
+    counts, gradient, settings = learner.counts, learner.gradient, learner.settings
+    gradient *= learner.trainable
+    counts[UPDATES] += 1
+    if settings.adam:
+        networks.adam_step(
+            learner.parameters,
+            gradient,
+            learner.first,
+            learner.second,
+            counts[UPDATES],
+            settings.learning_rate,
+        )
+    else:
+        networks.rmsprop_step(learner.parameters, gradient, learner.second, settings.learning_rate)
+    if counts[UPDATES] % settings.copy_every == 0:
+        learner.fixed[:] = learner.parameters
+        counts[COPIES] += 1
+        choices.after_copy(learner.epsilon)
+    return True

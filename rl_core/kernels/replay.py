@@ -1,0 +1,163 @@
+"""Experience replay: a memory of the latest N transitions, sampled uniformly.
+
+Transition number i (from 0) goes to slot i mod N, so that the newest overwrites the oldest. A batch
+is drawn with replacement, each from all transitions held with the same probability.
+
+Beside each transition stands a cache: V = max_a' Q(s', a') under a fixed network, which changes
+only when the network is copied. So V is computed when a transition is first sampled after a copy,
+and read from then on (`rl_core.kernels.q_update`). That gives the same numbers for less work.
+
+Source: L.-J. Lin (1992), Self-improving reactive agents based on reinforcement learning, planning
+and teaching.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rl_core.kernels.compiled import compiled
+
+NEVER = -1
+"""The stamp of a transition whose V has not been computed."""
+
+
+class Memory(NamedTuple):
+    """The latest transitions (s, a, r, s', end) of one seed, one a slot.
+
+    Attributes
+    ----------
+    observations, next_observations : float32 arrays of shape (N, n_observations)
+        s and s'.
+    actions : int64 array of shape (N,)
+    rewards : float64 array of shape (N,)
+        What is learned from: the shaped rewards, where rewards are shaped.
+    ends : bool array of shape (N,)
+        The terminal flag: whether s' is terminal. A step cut short by a cap is not terminal.
+    next_values : float32 array of shape (N,)
+        The cache of V.
+    stamps : int64 array of shape (N,)
+        How many copies the fixed network had seen when V was computed.
+    stored : int64 array of shape (1,)
+        Transitions stored so far, the overwritten ones included.
+    """
+
+    observations: NDArray[np.float32]
+    next_observations: NDArray[np.float32]
+    actions: NDArray[np.int64]
+    rewards: NDArray[np.float64]
+    ends: NDArray[np.bool_]
+    next_values: NDArray[np.float32]
+    stamps: NDArray[np.int64]
+    stored: NDArray[np.int64]
+
+
+def make_memory(capacity: int, n_observations: int) -> Memory:
+    """Make an empty memory.
+
+    Parameters
+    ----------
+    capacity : int
+        N, the transitions that it keeps, at least 1.
+    n_observations : int
+        Numbers in an observation.
+
+    Examples
+    --------
+    >>> memory = make_memory(3000, 6)
+    >>> memory.observations.shape, held(memory)
+    ((3000, 6), 0)
+    """
+    return Memory(
+        np.zeros((capacity, n_observations), np.float32),
+        np.zeros((capacity, n_observations), np.float32),
+        np.zeros(capacity, np.int64),
+        np.zeros(capacity),
+        np.zeros(capacity, np.bool_),
+        np.zeros(capacity, np.float32),
+        np.full(capacity, NEVER, np.int64),
+        np.zeros(1, np.int64),
+    )
+
+
+@compiled
+def held(memory: Memory) -> int:
+    """Number of transitions that can be sampled: all stored so far, at most N.
+
+    Examples
+    --------
+    >>> memory, s = make_memory(2, 1), np.ones(1, np.float32)
+    >>> for _ in range(3):
+    ...     store(memory, s, 0, -1.0, s, False)
+    >>> held(memory)
+    2
+    """
+    return min(int(memory.stored[0]), memory.actions.size)
+
+
+@compiled
+def store(
+    memory: Memory,
+    observation: NDArray[np.float32],
+    action: int,
+    reward: float,
+    next_observation: NDArray[np.float32],
+    end: bool,
+) -> None:
+    """Store a transition in the place of the oldest.
+
+    Parameters
+    ----------
+    memory : Memory
+        Changed in place.
+    observation, next_observation : float32 arrays of shape (n_observations,)
+        s and s', which are copied.
+    action : int
+    reward : float
+    end : bool
+        Whether s' is terminal.
+
+    Examples
+    --------
+    >>> memory, s = make_memory(2, 1), np.ones(1, np.float32)
+    >>> for reward in (-1.0, -2.0, -3.0):
+    ...     store(memory, s, 0, reward, s, False)
+    >>> memory.rewards
+    array([-3., -2.])
+    """
+    slot = memory.stored[0] % memory.actions.size
+    for i in range(observation.size):
+        memory.observations[slot, i] = observation[i]
+        memory.next_observations[slot, i] = next_observation[i]
+    memory.actions[slot] = action
+    memory.rewards[slot] = reward
+    memory.ends[slot] = end
+    memory.stamps[slot] = NEVER
+    memory.stored[0] += 1
+
+
+@compiled
+def sample(memory: Memory, uniforms: NDArray[np.float64], slots: NDArray[np.int64]) -> None:
+    """Turn uniforms in [0, 1) into slots, one each.
+
+    Parameters
+    ----------
+    memory : Memory
+        Not empty.
+    uniforms : float64 array of shape (n,)
+    slots : int64 array of shape (n,)
+        Overwritten.
+
+    Examples
+    --------
+    >>> memory, s = make_memory(10, 1), np.ones(1, np.float32)
+    >>> for _ in range(4):
+    ...     store(memory, s, 0, -1.0, s, False)
+    >>> slots = np.empty(3, np.int64)
+    >>> sample(memory, np.array([0.0, 0.3, 0.99]), slots)
+    >>> slots
+    array([0, 1, 3])
+    """
+    count = held(memory)
+    for k in range(uniforms.size):
+        slots[k] = int(uniforms[k] * count)

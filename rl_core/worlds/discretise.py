@@ -1,0 +1,344 @@
+"""A continuous world cut into cells, so that a table can hold its values.
+
+Every observed number o_k is sorted into one of n_k bins of equal width between its bounds,
+
+    i_k = floor(n_k (o_k - low_k) / (high_k - low_k)),   kept within 0 .. n_k - 1,
+
+and the cell is i_1, ..., i_d read as one number, the last index running fastest. A continuous
+action becomes one of a few levels, evenly spaced from its lower to its upper bound. The agent sees
+the cell only. Below the surface the world stays what it was: two states in one cell may behave
+differently, so that the cells are no Markov states, and a table can only be an approximation.
+
+`Discretised` does this to any Gymnasium environment. `GriddedTask` is the same for a compiled task
+(`rl_core.worlds.tasks`), and gives the same cells and rewards.
+
+Source: R. S. Sutton and A. G. Barto, Reinforcement Learning: An Introduction (2018), section 9.3
+and 9.5.3 (state aggregation; a single tiling).
+"""
+
+import math
+from collections.abc import Sequence
+from itertools import product
+from typing import Any, NamedTuple
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import ArrayLike, NDArray
+
+from rl_core.checks import floats, instance, integer, integers, require
+from rl_core.kernels.compiled import compiled
+from rl_core.worlds.environments import EnvironmentLike, opened
+from rl_core.worlds.names import find
+from rl_core.worlds.tasks import Kernel, Task
+from rl_core.worlds.twins import twin
+
+MAX_CELLS = 2**31 - 1
+
+
+class Grid(NamedTuple):
+    """Bins of equal width in every dimension; made by `make_grid`.
+
+    Attributes
+    ----------
+    low, high : float64 arrays of shape (d,)
+        Where the first bin begins and the last one ends. What lies outside falls into these two.
+    bins : int64 array of shape (d,)
+        Bins in every dimension.
+    """
+
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    bins: NDArray[np.int64]
+
+    @property
+    def n_cells(self) -> int:
+        """The number of cells."""
+        return math.prod(self.bins.tolist())
+
+
+def make_grid(
+    space: spaces.Space[Any],
+    bins: int | Sequence[int],
+    *,
+    low: ArrayLike | None = None,
+    high: ArrayLike | None = None,
+) -> Grid:
+    """Lay a grid over an observation space.
+
+    Parameters
+    ----------
+    space : gymnasium.spaces.Box
+        Flattened, if it has several axes.
+    bins : int or sequence of int
+        Bins in every dimension, or in each.
+    low, high : array of shape (d,), optional
+        Bounds to use instead of the space's, for example where these are infinite.
+
+    Raises
+    ------
+    ValueError
+        If the space is no Box, a bound is infinite or the lower not below the upper, a number of
+        bins is not a positive integer, there is not one for each dimension, or a table would have
+        more than 2^31 - 1 cells.
+
+    Examples
+    --------
+    >>> space = spaces.Box(np.array([-1.2, -0.07]), np.array([0.6, 0.07]), dtype=np.float64)
+    >>> make_grid(space, (3, 2)).n_cells
+    6
+    """
+    require(isinstance(space, spaces.Box), "env's observation space", space, "a Box")
+    assert isinstance(space, spaces.Box)
+    d = math.prod(space.shape)
+    bounds = []
+    for name, given, own in (("low", low, space.low), ("high", high, space.high)):
+        bound = floats(name, np.ravel(own if given is None else given), (d,), finite=False)
+        finite = bool(np.isfinite(bound).all())
+        require(finite, name, bound.tolist(), "finite in every dimension; give bounds to use")
+        bounds.append(bound)
+    require(bool((bounds[0] < bounds[1]).all()), "low", bounds[0].tolist(), "below high")
+    numbers = checked_bins("bins", bins)
+    numbers = (numbers,) * d if isinstance(numbers, int) else numbers
+    require(len(numbers) == d, "bins", bins, f"a positive integer, or {d} of them")
+    cells = math.prod(numbers)
+    require(cells <= MAX_CELLS, "bins", bins, f"such that there are at most {MAX_CELLS} cells")
+    return Grid(bounds[0], bounds[1], np.array(numbers, np.int64))
+
+
+def checked_bins(name: str, bins: object) -> int | tuple[int, ...]:
+    """Return a number of bins, or a tuple of them, each at least 1.
+
+    Examples
+    --------
+    >>> checked_bins("bins", [10, 20])
+    (10, 20)
+    """
+    if isinstance(bins, Sequence | np.ndarray) and not isinstance(bins, str):
+        require(len(bins) > 0, name, bins, "a positive integer, or one a dimension")
+        return integers(name, bins, 1)
+    return integer(name, bins, 1)
+
+
+@compiled
+def cell(grid: Grid, observation: NDArray[np.float32]) -> int:
+    """Number of the cell that an observation falls into, from 0.
+
+    Examples
+    --------
+    >>> grid = Grid(np.array([0.0, 0.0]), np.array([1.0, 1.0]), np.array([2, 5]))
+    >>> [cell(grid, np.array(o, np.float32)) for o in ((0.1, 0.3), (0.6, 0.3), (7.0, 7.0))]
+    [1, 6, 9]
+    """
+    index = 0
+    for k in range(observation.size):
+        width = grid.high[k] - grid.low[k]
+        i = math.floor(grid.bins[k] * ((np.float64(observation[k]) - grid.low[k]) / width))
+        index = index * grid.bins[k] + min(max(i, 0), grid.bins[k] - 1)
+    return index
+
+
+def action_levels(space: spaces.Space[Any], levels: int | None) -> NDArray[np.float32]:
+    """Actions to choose from: all of a Discrete space, or a grid over a Box.
+
+    Parameters
+    ----------
+    space : gymnasium.spaces.Discrete or gymnasium.spaces.Box
+        A Box has to be bounded.
+    levels : int or None
+        Levels of each component of a continuous action, at least 2; None for a Discrete space.
+
+    Returns
+    -------
+    float32 array of shape (n_actions, width)
+        Indices counted from 0, or all combinations of the levels.
+
+    Raises
+    ------
+    ValueError
+        If the space is neither, not bounded, or `levels` does not go with it.
+
+    Examples
+    --------
+    >>> action_levels(spaces.Box(-1, 1, (1,)), 3).ravel()
+    array([-1.,  0.,  1.], dtype=float32)
+    """
+    if isinstance(space, spaces.Discrete):
+        require(levels is None, "levels", levels, "None where actions are discrete")
+        return np.arange(int(space.n), dtype=np.float32)[:, None]
+    require(isinstance(space, spaces.Box), "env's action space", space, "Discrete or a Box")
+    assert isinstance(space, spaces.Box)
+    low, high = space.low.ravel(), space.high.ravel()
+    bounded = bool(np.isfinite(low).all() and np.isfinite(high).all())
+    require(bounded, "env's action space", space, "bounded")
+    require(levels is not None, "levels", levels, "an integer from 2 where actions are a Box")
+    levels = integer("levels", levels, 2)
+    ticks = [np.linspace(a, b, levels) for a, b in zip(low, high, strict=True)]
+    return np.array(list(product(*ticks)), np.float32)
+
+
+class Discretised(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """An environment whose observation is the number of a cell, and whose actions are numbered.
+
+    It has a Discrete observation and a Discrete action space, so that tabular learners take it.
+    Time limits and other wrappers below it stay in force.
+
+    Parameters
+    ----------
+    env : str, gymnasium.Env or callable
+        A Gymnasium id, an environment, or a function that makes one; with a Box observation space
+        and a Discrete or bounded Box action space.
+    bins, low, high
+        See `make_grid`.
+    levels : int or None
+        See `action_levels`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is not as described.
+
+    Examples
+    --------
+    >>> env = Discretised("MountainCarContinuous-v0", bins=20, levels=3)
+    >>> env.observation_space, env.action_space
+    (Discrete(400), Discrete(3))
+    >>> observation, _ = env.reset(seed=0)
+    >>> divmod(observation, 20)
+    (8, 10)
+    """
+
+    def __init__(
+        self,
+        env: EnvironmentLike,
+        bins: int | Sequence[int],
+        *,
+        levels: int | None = None,
+        low: ArrayLike | None = None,
+        high: ArrayLike | None = None,
+    ) -> None:
+        made = opened(env)
+        self.grid = make_grid(made.observation_space, bins, low=low, high=high)
+        self.levels = action_levels(made.action_space, levels)
+        self._native = made.action_space
+        super().__init__(made)
+        self.observation_space = spaces.Discrete(self.grid.n_cells)
+        self.action_space = spaces.Discrete(len(self.levels))
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[int, dict[str, Any]]:
+        """Begin an episode; see `gymnasium.Env.reset`."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        return self._cell(observation), info
+
+    def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
+        """Take the action of this number; see `gymnasium.Env.step`."""
+        taken: Any = self.levels[action]
+        if isinstance(self._native, spaces.Discrete):
+            taken = int(taken[0]) + int(self._native.start)
+        elif isinstance(self._native, spaces.Box):
+            taken = taken.astype(self._native.dtype).reshape(self._native.shape)
+        observation, reward, terminated, truncated, info = self.env.step(taken)
+        return self._cell(observation), float(reward), terminated, truncated, info
+
+    def _cell(self, observation: Any) -> int:
+        """Number the cell; compiled code relies on the observation's size."""
+        flat = np.ravel(observation)
+        fits = flat.size == self.grid.bins.size and flat.dtype.kind in "fiub"
+        if not fits or np.isnan(flat).any():
+            raise ValueError(
+                f"env must keep to its spaces: from {self.env}, the observation {observation!r} "
+                f"came, which has no cell; its observation space is {self.env.observation_space}"
+            )
+        return int(cell(self.grid, flat.astype(np.float32)))
+
+
+class GriddedTask(NamedTuple):
+    """A compiled task seen through a grid: what `Discretised` makes of it, without time limit.
+
+    Attributes
+    ----------
+    kernel : Kernel
+        The task, with its state.
+    grid : Grid
+    actions : float32 array of shape (n_actions, width)
+        What the task's `step` takes.
+    observation : float32 array of shape (d,)
+        What would be seen of it; overwritten.
+    max_steps : int
+        The task's own time limit; 0 where it has none.
+    """
+
+    kernel: Kernel
+    grid: Grid
+    actions: NDArray[np.float32]
+    observation: NDArray[np.float32]
+    max_steps: int
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Cells and actions."""
+        return self.grid.n_cells, len(self.actions)
+
+
+def gridded(
+    env: str | Task, bins: int | Sequence[int], *, levels: int | None = None
+) -> GriddedTask:
+    """Lay a grid over a compiled task.
+
+    Parameters
+    ----------
+    env : str or Task
+        An id of `rl_core.worlds.twins.TASKS`, the import path of a task, or a task.
+    bins, levels
+        As for `Discretised`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is not as described.
+
+    Examples
+    --------
+    >>> gridded("MountainCar-v0", bins=10).shape
+    (100, 3)
+    """
+    task = task_of(env)
+    instance("env", env if task is None else task, Task, "a compiled task")
+    assert task is not None
+    grid = make_grid(task.observation_space, bins)
+    actions = action_levels(task.action_space, levels)
+    seen = np.zeros(task.n_observations, np.float32)
+    return GriddedTask(task.kernel(), grid, actions, seen, task.max_episode_steps or 0)
+
+
+def task_of(env: object) -> Task | None:
+    """Return the compiled task that `env` is or names, if there is one.
+
+    Examples
+    --------
+    >>> task_of("FrozenLake-v1") is None
+    True
+    """
+    found = (twin(env) or find(env)) if isinstance(env, str) else env
+    return found if isinstance(found, Task) else None
+
+
+@compiled
+def start_gridded(world: GriddedTask, rng: np.random.Generator) -> int:
+    """Draw the start of an episode as the environment's `reset` does; return its cell.
+
+    The acrobot's first observation is here rounded as compiled code rounds a cosine, which may
+    differ from numpy's in the last bit.
+    """
+    world.kernel.start(rng, world.kernel.state, world.observation)
+    return cell(world.grid, world.observation)
+
+
+@compiled
+def step_gridded(world: GriddedTask, a: int) -> tuple[int, float, bool]:
+    """Take action number a; return the next cell, the reward, and whether the goal is reached."""
+    reward, terminated = world.kernel.step(world.kernel.state, world.actions[a])
+    world.kernel.observe(world.kernel.state, world.observation)
+    return cell(world.grid, world.observation), reward, terminated

@@ -1,0 +1,315 @@
+"""How any environment is opened and played, one step at a time.
+
+A world is a compiled task (`rl_core.worlds.tasks`) or any Gymnasium environment. Both have the same
+two verbs: `world.reset()` begins an episode in Python, and `step(world.stepper, action, following)`
+goes on. A loop written with `step` is plain Python for every world, and can be compiled where the
+stepper is a task's. The compiled tasks are exact twins of Gymnasium's, so that an episode is the
+same, bit for bit, whichever way it is played.
+
+What an environment returns is checked here, once, before compiled code sees it.
+"""
+
+import math
+from collections.abc import Callable, Iterable
+from numbers import Real
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numba.extending import overload
+from numpy.typing import NDArray
+
+from rl_core.kernels.compiled import compiled
+from rl_core.worlds.names import Make, find, make_environment
+from rl_core.worlds.tasks import Kernel, Task
+from rl_core.worlds.twins import twin
+
+EnvironmentLike = (
+    str | Make | Task | gymnasium.Env[Any, Any] | Callable[[], gymnasium.Env[Any, Any]]
+)
+"""An id, an id with arguments, an import path, a task, an environment, or a function making one."""
+
+
+class TaskWorld:
+    """A compiled task.
+
+    Parameters
+    ----------
+    task : rl_core.worlds.tasks.Task
+    """
+
+    def __init__(self, task: Task) -> None:
+        self.n_observations = task.n_observations
+        self.n_actions = task.n_actions
+        self.action_dimensions = task.action_dimensions
+        self.max_episode_steps = task.max_episode_steps
+        self.stepper = task.kernel()
+        self._task = task
+        self._rng = np.random.default_rng(0)
+
+    def seed(self, environment_seed: int) -> None:
+        """Start the environment's stream, the one Gymnasium makes of this seed."""
+        self._rng = np.random.default_rng(environment_seed)
+
+    def reset(self) -> NDArray[np.float32]:
+        """Begin an episode; return its first observation."""
+        observation = np.empty(self.n_observations, np.float32)
+        self._task.start(self._rng, self.stepper.state, observation)
+        return observation
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+
+class GymnasiumWorld:
+    """Any Gymnasium environment with Box observations and Discrete or Box actions.
+
+    Its time limit, if it has one, ends an episode as truncated. Observations are flattened and cast
+    to float32.
+
+    Parameters
+    ----------
+    environment : gymnasium.Env
+    owned : bool
+        Whether `close` closes the environment.
+
+    Raises
+    ------
+    ValueError
+        If observations are no Box, or actions neither Discrete nor Box.
+    """
+
+    def __init__(self, environment: gymnasium.Env[Any, Any], owned: bool) -> None:
+        observations, actions = environment.observation_space, environment.action_space
+        if not isinstance(observations, spaces.Box):
+            raise ValueError(f"env must have a Box observation space, got {observations}")
+        if not isinstance(actions, spaces.Discrete | spaces.Box):
+            raise ValueError(f"env must have a Discrete or a Box action space, got {actions}")
+        self.n_observations = math.prod(observations.shape)
+        self.n_actions = int(actions.n) if isinstance(actions, spaces.Discrete) else 0
+        self.action_dimensions = math.prod(actions.shape) if isinstance(actions, spaces.Box) else 0
+        self.max_episode_steps: int | None = None
+        self.stepper = self
+        self._environment = environment
+        self._space, self._actions = observations, actions
+        self._owned = owned
+        self._seed: int | None = None
+        self._steps = 0
+
+    def seed(self, environment_seed: int) -> None:
+        """Seed the environment at its next reset."""
+        self._seed = environment_seed
+
+    def reset(self) -> NDArray[np.float32]:
+        """Begin an episode; return its first observation."""
+        observation, _ = self._environment.reset(seed=self._seed)
+        self._seed, self._steps = None, 0
+        first = np.empty(self.n_observations, np.float32)
+        self._see(observation, first)
+        return first
+
+    def step(
+        self, action: NDArray[np.float32], following: NDArray[np.float32]
+    ) -> tuple[float, bool, bool]:
+        """Take one step; see `step`."""
+        self._steps += 1
+        native: Any
+        if isinstance(self._actions, spaces.Discrete):
+            native = int(action[0]) + int(self._actions.start)
+        else:
+            native = action.astype(self._actions.dtype).reshape(self._actions.shape)
+        seen, reward, terminated, truncated, _ = self._environment.step(native)
+        self._see(seen, following)
+        if type(reward) is not float:
+            reward = checked_reward(self._environment, reward)
+        return reward, bool(terminated), bool(truncated)
+
+    def _see(self, seen: Any, following: NDArray[np.float32]) -> None:
+        """Write an observation, if it is what its space says: compiled code relies on its size."""
+        # The first line is the quick way through for what an environment should return.
+        if type(seen) is not np.ndarray or seen.shape != self._space.shape:
+            try:
+                seen = np.asarray(seen)
+            except ValueError:
+                seen = np.asarray(None)
+            if seen.shape != self._space.shape:
+                self._refuse(f"an observation of shape {seen.shape} came")
+        if seen.dtype.kind not in "fiub":
+            self._refuse(f"an observation of type {seen.dtype} came")
+        following[:] = seen.ravel()
+
+    def _refuse(self, what: str) -> None:
+        name = self._environment.spec.id if self._environment.spec else self._environment
+        raise ValueError(
+            f"env must keep to its spaces: from {name}, at step {self._steps} of an episode, "
+            f"{what}; its observation space is {self._space}"
+        )
+
+    def close(self) -> None:
+        """Close the environment if it was made here."""
+        if self._owned:
+            self._environment.close()
+
+
+World = TaskWorld | GymnasiumWorld
+
+
+def checked_reward(env: gymnasium.Env[Any, Any], reward: Any) -> float:
+    """Return a reward as a float, if it is one number.
+
+    Raises
+    ------
+    ValueError
+        It is not.
+
+    Examples
+    --------
+    >>> checked_reward(gymnasium.make("FrozenLake-v1"), np.array([1]))
+    1.0
+    """
+    single = isinstance(reward, np.ndarray) and reward.size == 1
+    number = reward.item() if single or isinstance(reward, np.generic) else reward
+    if not isinstance(number, Real):
+        raise ValueError(f"env must pay a number as reward, from {env} came {reward!r}")
+    return float(number)
+
+
+def step(
+    stepper: Kernel | GymnasiumWorld, action: NDArray[np.float32], following: NDArray[np.float32]
+) -> tuple[float, bool, bool]:
+    """Take one step of a world.
+
+    Parameters
+    ----------
+    stepper : Kernel or GymnasiumWorld
+        `world.stepper`; changed in place.
+    action : float32 array of shape (action_width,)
+        The index of a discrete action, counted from 0, or a continuous one as drawn.
+    following : float32 array of shape (n_observations,)
+        The next observation is written here.
+
+    Returns
+    -------
+    reward : float
+    terminated, truncated : bool
+
+    Examples
+    --------
+    >>> world = open_world("MountainCar-v0")
+    >>> world.seed(0)
+    >>> following = world.reset()
+    >>> step(world.stepper, np.array([2], np.float32), following)
+    (-1.0, False, False)
+    """
+    if isinstance(stepper, Kernel):
+        return _step_task(stepper, action, following)
+    return stepper.step(action, following)
+
+
+@compiled
+def _step_task(
+    kernel: Kernel, action: NDArray[np.float32], following: NDArray[np.float32]
+) -> tuple[float, bool, bool]:
+    reward, terminated = kernel.step(kernel.state, action)
+    kernel.observe(kernel.state, following)
+    return reward, terminated, False
+
+
+# What it means in compiled code.
+overload(step)(
+    lambda stepper, action, following: (
+        lambda stepper, action, following: _step_task(stepper, action, following)
+    )
+)
+
+
+def open_world(env: EnvironmentLike) -> World:
+    """Open an environment to be played.
+
+    Parameters
+    ----------
+    env : str, Make, Task, gymnasium.Env or callable
+        The ids in `rl_core.worlds.twins.TASKS` are played compiled, with the time limit that the
+        task declares. Any other id is made by Gymnasium, with the limit it is registered with, and
+        so is an id with arguments (`Make`). An import path "module:name" leads to a task, or to a
+        function or class that makes an environment. An environment is taken as it is.
+
+    Returns
+    -------
+    TaskWorld or GymnasiumWorld
+
+    Raises
+    ------
+    ValueError
+        If there is no such environment, or the spaces are of another kind.
+    TypeError
+        If `env` is none of these.
+
+    Examples
+    --------
+    >>> open_world("Acrobot-v1").n_actions
+    3
+    """
+    if isinstance(env, str) and (task := twin(env)) is not None:
+        return TaskWorld(task)
+    found: Any = find(env) if isinstance(env, str) else env
+    if isinstance(found, Task):
+        return TaskWorld(found)
+    made = opened(env)
+    try:
+        return GymnasiumWorld(made, owned=made is not env)
+    except ValueError:
+        if made is not env:
+            made.close()
+        raise
+
+
+def opened(env: Any) -> gymnasium.Env[Any, Any]:
+    """Return an environment: itself, what a function makes, or what its name stands for.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As `open_world`.
+
+    Examples
+    --------
+    >>> opened("FrozenLake-v1").observation_space
+    Discrete(16)
+    """
+    if isinstance(env, str | Make):
+        return make_environment(env)
+    made = env() if callable(env) and not isinstance(env, gymnasium.Env) else env
+    if not isinstance(made, gymnasium.Env):
+        raise TypeError(
+            "env must be a Gymnasium id, an import path, a task, an environment or a function that "
+            f"makes one, got {env!r}"
+        )
+    return made
+
+
+def one_seed_of(env: object, seeds: Iterable[int]) -> Iterable[int]:
+    """Return the seeds, unless there are several and the environment is ready made.
+
+    What an environment or its wrappers remember would go from one seed to the next, and the seeds
+    would share it.
+
+    Raises
+    ------
+    ValueError
+        With what to give instead.
+
+    Examples
+    --------
+    >>> one_seed_of(gymnasium.make("CartPole-v1"), [0, 1])
+    Traceback (most recent call last):
+    ValueError: env must be an id or a function that makes an environment where there are several...
+    """
+    seeds = tuple(seeds) if isinstance(seeds, Iterable) else seeds
+    if isinstance(env, gymnasium.Env) and len(seeds) > 1:
+        raise ValueError(
+            "env must be an id or a function that makes an environment where there are several "
+            f"seeds, which would share what one environment remembers, got {env!r}"
+        )
+    return seeds

@@ -1,0 +1,135 @@
+"""Reward shaping: what an agent learns from, in place of what the environment pays.
+
+A shaping is a function `f(observation, reward) -> float` of the next observation (a float32 vector)
+and the environment's reward. It stands at the top of a module, is named in a config, and is
+compiled, so that it runs inside the compiled loop and gives the same bits in the plain one.
+
+`tip_height` and `distance_from_start` are the report's (section 3.2). Neither is a difference of
+potentials, so the best policy under them need not be the best under the original rewards (Ng,
+Harada and Russell 1999, Policy invariance under reward transformations).
+"""
+
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+import numba
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from rl_core.imports import code_behind, imported
+from rl_core.kernels.compiled import compiled
+
+ORIGINAL = "rl_core.worlds.shaping:original"
+"""The environment's own reward."""
+
+_SIGNATURE = types.float64(types.Array(types.float32, 1, "C"), types.float64)
+
+
+def original(observation: NDArray[np.float32], reward: float) -> float:
+    """The environment's own reward."""
+    return reward
+
+
+def tip_height(observation: NDArray[np.float32], reward: float) -> float:
+    """Acrobot: r = -(cos theta1 + cos(theta1 + theta2)), the height of the tip above the pivot.
+
+    From -2 (hanging) to 2 (upright); the goal is above 1. An observation holds the cosines and
+    sines of both angles: cos(theta1 + theta2) = cos cos - sin sin.
+
+    Examples
+    --------
+    >>> tip_height(np.array([1, 0, 1, 0, 0, 0], np.float32), -1.0)
+    -2.0
+    """
+    cosine1, sine1 = float(observation[0]), float(observation[1])
+    cosine2, sine2 = float(observation[2]), float(observation[3])
+    return -(cosine1 + (cosine1 * cosine2 - sine1 * sine2))
+
+
+def distance_from_start(observation: NDArray[np.float32], reward: float) -> float:
+    """MountainCar: r = |position - (-0.5)|, the distance from the middle of the starting places.
+
+    From 0 to 1, which is at the flag.
+
+    Examples
+    --------
+    >>> distance_from_start(np.array([-1.0, 0.0], np.float32), -1.0)
+    0.5
+    """
+    return abs(float(observation[0]) + 0.5)
+
+
+def balance(observation: NDArray[np.float32], reward: float) -> float:
+    """CartPole: r = (1 - |x| / 2.4 - 2 |theta|) / 20, most for an upright pole in the middle.
+
+    An episode ends when x (metres) leaves [-2.4, 2.4] or theta (radians) leaves [-0.21, 0.21]. The
+    factor keeps the values near 1, where a network begins.
+
+    Examples
+    --------
+    >>> balance(np.zeros(4, np.float32), 1.0)
+    0.05
+    """
+    return (reward - abs(float(observation[0])) / 2.4 - 2 * abs(float(observation[2]))) / 20
+
+
+@dataclass(frozen=True)
+class Shaping:
+    """A shaping by name, as a config holds it.
+
+    Attributes
+    ----------
+    function : str
+        Where the function is: "module:name".
+    code : str
+        Digest of the module's source, so that an edited function counts as another one.
+
+    Raises
+    ------
+    ValueError
+        There is no such function, or it cannot be compiled as `f(observation, reward) -> float`.
+
+    Examples
+    --------
+    >>> Shaping("rl_core.worlds.shaping:tip_height").function
+    'rl_core.worlds.shaping:tip_height'
+    """
+
+    function: str
+    code: str = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        imported("shaping", self.function)
+        try:
+            compiled_shape(self.function)
+        except (AttributeError, TypeError, ValueError, numba.NumbaError) as error:
+            reason = str(error).strip().splitlines()[0] if str(error).strip() else "no reason given"
+            raise ValueError(
+                "shaping must name a function f(observation, reward) -> float that numba compiles, "
+                f"got {self.function!r} ({reason})"
+            ) from error
+        object.__setattr__(self, "code", code_behind(self.function))
+
+
+@cache
+def compiled_shape(function: str) -> Any:
+    """Compile the function at "module:name" to what compiled code can call.
+
+    Every shape has the same type, so that no kernel has to be compiled anew for another one.
+    """
+    return numba.cfunc(_SIGNATURE)(imported("shaping", function))
+
+
+@compiled
+def shaped_reward(shape: Any, observation: NDArray[np.float32], reward: float) -> float:
+    """Return what a compiled shape makes of a reward and the observation that came with it.
+
+    Examples
+    --------
+    >>> shape = compiled_shape("rl_core.worlds.shaping:tip_height")
+    >>> shaped_reward(shape, np.array([1, 0, 1, 0, 0, 0], np.float32), -1.0)
+    -2.0
+    """
+    return float(shape(observation, reward))

@@ -1,0 +1,241 @@
+"""Worlds of finitely many states and actions, to be acted in one step at a time.
+
+There are three kinds, with the same two verbs, `start` and `step`: an `MDP`, as arrays that
+compiled code steps through (`Model`), a compiled task seen through a grid (`GriddedTask`), and any
+discrete Gymnasium environment (`Played`). Given equal streams, an environment and its model behave
+alike. A loop written with these verbs is plain Python for all kinds, and can be compiled for the
+first two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from operator import index
+from typing import Any, NamedTuple
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from numba.extending import overload
+from numpy.typing import NDArray
+
+from rl_core.kernels.compiled import compiled
+from rl_core.mdp import MDP
+from rl_core.worlds.discretise import GriddedTask, start_gridded, step_gridded
+from rl_core.worlds.environments import EnvironmentLike, checked_reward, opened
+
+
+class Draws(NamedTuple):
+    """The random numbers of an agent in a world.
+
+    Start states have a stream of their own, so that it does not matter to the transitions how many
+    numbers a `reset` draws (the Maze's none, Gymnasium's toy-text environments one).
+    """
+
+    start: np.random.Generator
+    step: np.random.Generator
+    policy: np.random.Generator
+
+
+def spawn_draws(seed: int, n: int) -> list[Draws]:
+    """Spawn n independent sets of draws from `SeedSequence(seed)`.
+
+    Each generator is the one that an environment's `reset(seed=number)` makes from the number
+    drawn for it.
+
+    Examples
+    --------
+    >>> learning, evaluation = spawn_draws(0, 2)
+    >>> learning.step.random() != evaluation.step.random()
+    True
+    """
+    children = np.random.SeedSequence(seed).spawn(3 * n)
+    numbers = [int(child.generate_state(1, np.uint64)[0]) for child in children]
+    generators = [np.random.default_rng(number) for number in numbers]
+    return [Draws(*generators[3 * i : 3 * i + 3]) for i in range(n)]
+
+
+class Model(NamedTuple):
+    """An `MDP` as compiled code steps through it: with cumulative probabilities."""
+
+    successor: NDArray[np.int32]
+    cumulative: NDArray[np.float64]
+    reward: NDArray[np.float64]
+    terminal: NDArray[np.bool_]
+    start_state: NDArray[np.int32]
+    start_cumulative: NDArray[np.float64]
+
+
+def model_arrays(mdp: MDP) -> Model:
+    """Return the arrays of a model.
+
+    Examples
+    --------
+    >>> from rl_core.maze import Maze
+    >>> model_arrays(Maze().model()).cumulative[0, 0].tolist()
+    [0.9, 1.0]
+    """
+    return Model(
+        mdp.successor,
+        np.cumsum(mdp.probability, axis=2),
+        mdp.reward,
+        mdp.terminal,
+        mdp.start_state,
+        np.cumsum(mdp.start_probability),
+    )
+
+
+class Played(NamedTuple):
+    """An environment with Discrete spaces; its numbers are counted from 0 here.
+
+    Attributes
+    ----------
+    env : gymnasium.Env
+        The environment, wrapped or not.
+    observations, actions : gymnasium.spaces.Discrete
+        Its spaces.
+    """
+
+    env: gym.Env[Any, Any]
+    observations: spaces.Discrete[Any]
+    actions: spaces.Discrete[Any]
+
+
+def played(env: EnvironmentLike) -> Played:
+    """Open an environment, unless it is one already, and check that it is discrete.
+
+    Raises
+    ------
+    TypeError, ValueError
+        There is no such environment (`rl_core.worlds.environments.opened`), or a space is not
+        Discrete.
+
+    Examples
+    --------
+    >>> played("MountainCar-v0")
+    Traceback (most recent call last):
+    ValueError: env must have a Discrete observation space, got Box([-1.2  -0.07], [0.6  0.07], ...
+    """
+    made = opened(env)
+    observations, actions = made.observation_space, made.action_space
+    for name, space in (("observation", observations), ("action", actions)):
+        if not isinstance(space, spaces.Discrete):
+            if made is not env:
+                made.close()
+            raise ValueError(f"env must have a Discrete {name} space, got {space}")
+    assert isinstance(observations, spaces.Discrete)
+    assert isinstance(actions, spaces.Discrete)
+    return Played(made, observations, actions)
+
+
+def known_model(world: Played) -> MDP | None:
+    """Return the environment's model, if it has one with its states (and one more for the end).
+
+    Examples
+    --------
+    >>> known_model(played("FrozenLake-v1")).n_states
+    16
+    """
+    try:
+        model = MDP.from_env(world.env)
+    except ValueError:
+        return None
+    n_states = int(world.observations.n)
+    return model if model.n_states in (n_states, n_states + 1) else None
+
+
+DiscreteWorld = Model | GriddedTask | Played
+
+
+def start(world: DiscreteWorld, draws: Draws) -> int:
+    """Begin an episode; return its start state."""
+    if isinstance(world, Played):
+        return _start_in_env(world, draws)
+    if isinstance(world, GriddedTask):
+        return start_gridded(world, draws.start)
+    return _start_on_model(world, draws)
+
+
+def step(world: DiscreteWorld, s: int, a: int, draws: Draws) -> tuple[int, float, bool, bool]:
+    """Take action a in the current state s; return s', r, terminated, truncated."""
+    if isinstance(world, Played):
+        return _step_in_env(world, a)
+    if isinstance(world, GriddedTask):
+        return _step_in_grid(world, a)
+    return _step_on_model(world, s, a, draws)
+
+
+@compiled
+def _start_on_model(model: Model, draws: Draws) -> int:
+    """Draw a start state by one uniform."""
+    return int(model.start_state[_slot(model.start_cumulative, draws.start.random())])
+
+
+@compiled
+def _step_on_model(model: Model, s: int, a: int, draws: Draws) -> tuple[int, float, bool, bool]:
+    """Draw s' and r by one uniform. A terminal s' terminates; nothing truncates."""
+    k = _slot(model.cumulative[s, a], draws.step.random())
+    s_next = int(model.successor[s, a, k])
+    return s_next, float(model.reward[s, a, k]), bool(model.terminal[s_next]), False
+
+
+@compiled
+def _step_in_grid(world: GriddedTask, a: int) -> tuple[int, float, bool, bool]:
+    """Take a step; nothing truncates."""
+    s_next, r, terminated = step_gridded(world, a)
+    return s_next, r, terminated, False
+
+
+@compiled
+def _slot(cumulative: NDArray[np.float64], u: float) -> int:
+    """Return the first slot whose cumulative probability exceeds u, as Gymnasium does."""
+    for k in range(len(cumulative)):
+        if cumulative[k] > u:
+            return k
+    return 0
+
+
+# What the verbs mean in compiled code is decided by the type of the world.
+_starts: dict[type, Callable[..., int]] = {
+    Model: lambda world, draws: _start_on_model(world, draws),
+    GriddedTask: lambda world, draws: start_gridded(world, draws.start),
+}
+_steps: dict[type, Callable[..., tuple[int, float, bool, bool]]] = {
+    Model: lambda world, s, a, draws: _step_on_model(world, s, a, draws),
+    GriddedTask: lambda world, s, a, draws: _step_in_grid(world, a),
+}
+overload(start)(lambda world, draws: _starts[world.instance_class])
+overload(step)(lambda world, s, a, draws: _steps[world.instance_class])
+
+
+def _start_in_env(world: Played, draws: Draws) -> int:
+    """Reset the environment; the draws take the place of its own generator."""
+    base = world.env.unwrapped
+    base.np_random = draws.start
+    observation, _ = world.env.reset()
+    base.np_random = draws.step
+    return _state(world, observation)
+
+
+def _step_in_env(world: Played, a: int) -> tuple[int, float, bool, bool]:
+    observation, r, terminated, truncated, _ = world.env.step(int(a + world.actions.start))
+    return (
+        _state(world, observation),
+        checked_reward(world.env, r),
+        bool(terminated),
+        bool(truncated),
+    )
+
+
+def _state(world: Played, observation: Any) -> int:
+    """Return a state's number, counted from 0; tables are indexed with it in compiled code."""
+    try:
+        state = index(observation) - int(world.observations.start)
+    except TypeError:
+        state = -1
+    if not 0 <= state < world.observations.n:
+        raise ValueError(
+            f"env must keep to its spaces: from {world.env}, the observation {observation!r} came; "
+            f"its observation space is {world.observations}"
+        )
+    return state
