@@ -8,7 +8,7 @@ equation, V(s) = max_a Σ_k p_k (r_k + γ V(s'_k)), in every state, the policy i
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -47,7 +47,7 @@ class Certificate:
 
 
 def certify(
-    mdp: MDP, plan: Plan, *, gamma: Fraction, fractions: Collection[Fraction] = ()
+    mdp: MDP, plan: Plan, *, gamma: Fraction, fractions: Sequence[Fraction] | Set[Fraction] = ()
 ) -> Certificate:
     """Prove in fractions that the plan's policy is optimal, and say how far its values are off.
 
@@ -59,7 +59,7 @@ def certify(
         What a planner found for it.
     gamma : Fraction
         The discount, from 0 to below 1.
-    fractions : collection of Fraction
+    fractions : sequence or set of Fraction
         What the model's probabilities and rewards stand for; integers stand for themselves.
 
     Returns
@@ -105,8 +105,9 @@ def certify(
     return Certificate(mdp.n_states, tuple(V), _distance(plan.V, V), _distance(plan.Q, Q))
 
 
-def _in_fractions(mdp: MDP, fractions: Collection[Fraction]) -> list[list[Outcomes]]:
+def _in_fractions(mdp: MDP, fractions: Sequence[Fraction] | Set[Fraction]) -> list[list[Outcomes]]:
     """Return the possible outcomes of every state and action."""
+    checks.instance("fractions", fractions, Sequence | Set, "of Fractions")
     for fraction in fractions:
         checks.instance("fractions", fraction, Fraction, "of Fractions")
     meant: dict[float, Fraction] = {}

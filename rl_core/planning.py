@@ -318,6 +318,8 @@ def policy_iteration(
     ------
     ValueError, TypeError
         If an argument is out of range or has the wrong type.
+    ArithmeticError
+        If γ is so close to 1 that `evaluation_threshold` is too many sweeps away.
 
     Notes
     -----
