@@ -6,6 +6,7 @@ import subprocess
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import imageio_ffmpeg
 import matplotlib as mpl
@@ -17,6 +18,7 @@ from matplotlib_inline.backend_inline import set_matplotlib_formats
 from numpy.typing import NDArray
 
 from rl_core.checks import instance, number, require
+from rl_core.statistics import bootstrap_interval
 
 # Okabe & Ito (2008), "Color universal design": told apart with every common colour blindness.
 BLACK = "#000000"
@@ -83,6 +85,43 @@ def label(axes: Axes, *, x: str, y: str, title: str = "") -> None:
     axes.set_ylabel(y)
     if title:
         axes.set_title(title)
+
+
+def median_band(
+    axes: Axes,
+    x: NDArray[np.integer],
+    seeds: NDArray[np.float64],
+    *,
+    colour: str,
+    line: Any,
+    text: str | None,
+    top: float | None = None,
+    marker: str = "",
+) -> None:
+    """Draw the median over seeds, and its 95% interval as a band.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    x : ndarray of shape (points,)
+    seeds : ndarray of shape (seeds, points)
+        A seed that stopped (NaN), or reached no goal, counts as needing for ever.
+    colour, line, marker : str
+        As in matplotlib; a line may be a dash pattern.
+    text : str or None
+        For the legend.
+    top : float, optional
+        To where the band goes if it has no end; by default the largest value of a seed.
+    """
+    values = np.where(np.isnan(seeds), np.inf, seeds)
+    rng = np.random.default_rng(np.random.SeedSequence(2020))
+    middle, low, high = bootstrap_interval(values, rng=rng, resamples=2_000)
+    upper = np.where(np.isinf(high), np.nanmax(seeds) if top is None else top, high)
+    axes.fill_between(
+        *(x, low, upper), where=np.isfinite(low).tolist(), color=colour, alpha=0.22, lw=0
+    )
+    drawn = np.where(np.isinf(middle), np.nan, middle)
+    axes.plot(x, drawn, color=colour, ls=line, marker=marker, ms=4, label=text)
 
 
 class Film:
