@@ -26,7 +26,7 @@ from rl_core.kernels import likelihood, networks
 from rl_core.kernels.choices import EPSILON_GREEDY, choose
 from rl_core.kernels.compiled import compiled
 from rl_core.kernels.likelihood import Policy
-from rl_core.policies import Gaussian
+from rl_core.policies import MLP, Gaussian
 from rl_core.reinforce import ReinforceConfig
 from rl_core.worlds.discretise import GriddedTask, start_gridded, step_gridded
 from rl_core.worlds.environments import EnvironmentLike, World, open_world
@@ -78,8 +78,9 @@ def as_learned(config: ReinforceConfig, weights: Mapping[str, NDArray[np.float32
 
     Raises
     ------
-    ValueError
-        The configuration and the weights do not go together.
+    TypeError, ValueError
+        `config` is no ReinforceConfig or its network no MLP, or the weights are not of one network,
+        or without the `log_sigma` of a Gaussian.
 
     Examples
     --------
@@ -87,7 +88,23 @@ def as_learned(config: ReinforceConfig, weights: Mapping[str, NDArray[np.float32
     >>> as_learned(ReinforceConfig(network=MLP(())), weights).policy.sizes
     array([2, 3])
     """
-    return Agent(*_policy_of(config, weights))
+    instance("config", config, ReinforceConfig, "a ReinforceConfig")
+    instance("weights", weights, Mapping, "a mapping of names to arrays")
+    require(isinstance(config.network, MLP), "network", config.network, "an MLP(...)")
+    sizes, network = networks.pack(weights)
+    if not isinstance(config.policy, Gaussian):
+        return Agent(Policy(np.array(sizes), False, False, False, 1), network)
+    given = "log_sigma" in weights
+    require(given, "weights", sorted(weights), "with 'log_sigma', since the policy is Gaussian")
+    log_sigma = weights["log_sigma"]
+    policy = Policy(
+        np.array(sizes),
+        True,
+        config.policy.mean == "weights",
+        config.policy.constant_feature,
+        len(log_sigma),
+    )
+    return Agent(policy, np.append(network, log_sigma).astype(np.float32))
 
 
 def of_values(weights: Mapping[str, NDArray[np.float32]], epsilon: float = 0.0) -> Agent:
@@ -459,54 +476,6 @@ def action_values(
     )
 
 
-def _policy_of(
-    config: ReinforceConfig, weights: Mapping[str, NDArray[np.float32]]
-) -> tuple[Policy, NDArray[np.float32]]:
-    """Put a policy and its parameter vector together again.
-
-    Parameters
-    ----------
-    config : ReinforceConfig
-        Of the run that made the weights.
-    weights : mapping of str to array
-        Of one seed, as `weights_of` gives them.
-
-    Returns
-    -------
-    policy : Policy
-    parameters : float32 array of shape (P,)
-
-    Raises
-    ------
-    ValueError
-        If `config` is no ReinforceConfig, the weights are not those of one network, or a Gaussian's
-        `log_sigma` is missing.
-
-    Examples
-    --------
-    >>> weights = {"layer0.weight": np.zeros((2, 3), np.float32)}
-    >>> policy, parameters = policy_of(ReinforceConfig(hidden=()), weights)
-    >>> policy.sizes, parameters.shape
-    (array([2, 3]), (9,))
-    """
-    instance("config", config, ReinforceConfig, "a ReinforceConfig")
-    instance("weights", weights, Mapping, "a mapping of names to arrays")
-    sizes, network = networks.pack(weights)
-    if not isinstance(config.policy, Gaussian):
-        return Policy(np.array(sizes), False, False, False, 1), network
-    given = "log_sigma" in weights
-    require(given, "weights", sorted(weights), "with 'log_sigma', since the policy is Gaussian")
-    log_sigma = weights["log_sigma"]
-    policy = Policy(
-        np.array(sizes),
-        True,
-        config.policy.mean == "weights",
-        config.policy.constant_feature,
-        len(log_sigma),
-    )
-    return policy, np.append(network, log_sigma)
-
-
 def mean_actions(
     config: ReinforceConfig,
     weights: Mapping[str, NDArray[np.float32]],
@@ -539,7 +508,7 @@ def mean_actions(
     array([[21.]], dtype=float32)
     """
     require(isinstance(config.policy, Gaussian), "policy", config.policy, "Gaussian(...)")
-    policy, parameters = _policy_of(config, weights)
+    policy, parameters, _ = as_learned(config, weights)
     width = int(policy.sizes[0]) - policy.constant_feature
     features = floats("observations", observations, (None, width)).astype(np.float32)
     if policy.constant_feature:

@@ -35,7 +35,7 @@ def imported(name: str, path: object) -> Any:
         found = importlib.import_module(module)
         for part in attribute.split("."):
             found = getattr(found, part)
-    except (ImportError, AttributeError, ValueError) as error:
+    except Exception as error:  # importing runs a module's code, which may raise anything
         raise ValueError(f"{allowed} ({error})") from error
     return found
 

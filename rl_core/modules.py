@@ -1,12 +1,13 @@
 """Networks in torch: the perceptron, any module by name, and the optimisers of 2018.
 
-A module draws nothing from torch's global generator, and runs on one thread with deterministic
+torch's own generator is seeded for them and put back, and they run on one thread with deterministic
 algorithms: the same seed gives the same bits.
 """
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import deepcopy
 from itertools import pairwise
 from typing import Any
 
@@ -70,10 +71,12 @@ def make_module(
     Raises
     ------
     ValueError
-        The function returns no torch module, or one whose output has another shape.
+        The function returns no torch module, or one without anything to learn, or one whose output
+        has another shape.
 
     Examples
     --------
+    >>> from rl_core.policies import Module
     >>> make_module(Module("torch.nn:Linear"), 2, 3, np.random.default_rng(0)).out_features
     3
     """
@@ -82,46 +85,69 @@ def make_module(
         return perceptron(sizes, networks.xavier_uniform(sizes, rng), network.biases)
     function = imported("network", network.function)
     with _seeded(int(rng.integers(2**63))):
-        module = function(n_inputs, n_outputs)
+        try:
+            module = function(n_inputs, n_outputs)
+        except Exception as error:  # it is the user's code
+            raise ValueError(
+                f"network must be a function (n_inputs, n_outputs), {network.function} with "
+                f"({n_inputs}, {n_outputs}) raises: {error}"
+            ) from error
         if not isinstance(module, torch.nn.Module):
             raise ValueError(
                 f"network must make a torch.nn.Module, {network.function} made {module!r}"
             )
-        try:
-            with torch.no_grad():
-                shape = tuple(module(torch.zeros(2, n_inputs)).shape)
-        except (RuntimeError, TypeError, AttributeError, ValueError) as error:
+        if not any(parameter.requires_grad for parameter in module.parameters()):
             raise ValueError(
-                f"network must take inputs of shape (batch, {n_inputs}), "
-                f"{network.function} raises: {error}"
-            ) from error
-    if shape != (2, n_outputs):
-        raise ValueError(
-            f"network must put out the shape (batch, {n_outputs}), of {network.function} it is "
-            f"{shape} for a batch of 2"
-        )
+                f"network must have parameters that learn, {network.function} made {module!r}"
+            )
+        for batch in (1, 2):  # to act, and to learn
+            _check_output(network.function, module, batch, n_inputs, n_outputs)
     return module
+
+
+def _check_output(
+    name: str, module: torch.nn.Module, batch: int, n_inputs: int, n_outputs: int
+) -> None:
+    """Try out a copy: a call may change what a module remembers of its inputs."""
+    try:
+        with torch.no_grad():
+            shape = tuple(deepcopy(module)(torch.zeros(batch, n_inputs)).shape)
+    except Exception as error:  # it is the user's code
+        raise ValueError(
+            f"network must take inputs of shape ({batch}, {n_inputs}), {name} raises: {error}"
+        ) from error
+    if shape != (batch, n_outputs):
+        raise ValueError(
+            f"network must put out the shape (batch, {n_outputs}), of {name} it is {shape} for a "
+            f"batch of {batch}"
+        )
 
 
 @contextmanager
 def _seeded(seed: int) -> Iterator[None]:
-    """Seed torch's generator, from which modules draw their weights, and put it back."""
+    """Seed torch's own generator, and put it back."""
     with torch.random.fork_rng(devices=[]):
         torch.default_generator.manual_seed(seed)
         yield
 
 
 @contextmanager
-def reproducible() -> Iterator[None]:
-    """Run torch on one thread with deterministic algorithms; put both back afterwards."""
-    threads, deterministic = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
+def reproducible(seed: int = 0) -> Iterator[None]:
+    """Run torch on one thread with deterministic algorithms; put all back afterwards.
+
+    What a module draws when it is called (dropout) comes from torch's own generator, which begins
+    with `seed`.
+    """
+    threads, mode = torch.get_num_threads(), torch.get_deterministic_debug_mode()
     torch.set_num_threads(1)
-    torch.use_deterministic_algorithms(True)
+    # Unlike `use_deterministic_algorithms` it does not import torch's compiler, for seconds.
+    torch.set_deterministic_debug_mode("error")
     try:
-        yield
+        with _seeded(seed):
+            yield
     finally:
         torch.set_num_threads(threads)
-        torch.use_deterministic_algorithms(deterministic)
+        torch.set_deterministic_debug_mode(mode)
 
 
 def as_arrays(module: torch.nn.Module) -> dict[str, NDArray[Any]]:
@@ -161,7 +187,7 @@ class Adam(torch.optim.Optimizer):
     >>> theta = torch.nn.Parameter(torch.ones(1))
     >>> theta.grad = torch.tensor([5.0])
     >>> Adam([theta], lr=0.1).step()
-    >>> round(float(theta), 6)
+    >>> round(theta.item(), 6)
     0.9
     """
 
@@ -191,7 +217,7 @@ class RMSProp(torch.optim.Optimizer):
     >>> theta = torch.nn.Parameter(torch.ones(1))
     >>> theta.grad = torch.tensor([1.0])
     >>> RMSProp([theta], lr=0.1).step()
-    >>> round(float(theta), 6)
+    >>> round(theta.item(), 6)
     0.9
     """
 

@@ -196,15 +196,7 @@ def log_probability(
 
 
 class TorchLearner:
-    """REINFORCE as its equation says, for any network from features to outputs.
-
-    Parameters
-    ----------
-    policy : Policy
-    module : torch.nn.Module
-    log_sigma : torch.nn.Parameter
-    config : ReinforceConfig
-    """
+    """REINFORCE as its equation says, for any network from features to outputs."""
 
     def __init__(
         self,
@@ -239,7 +231,7 @@ class TorchLearner:
             for batch in order.split(self.batch_size):
                 loss = self.loss(s[batch], a[batch], v[batch])
                 self.optimiser.zero_grad()
-                loss.backward()
+                loss.backward()  # type: ignore[no-untyped-call]
                 self.optimiser.step()
 
 
@@ -251,16 +243,11 @@ class _Agent(NamedTuple):
     arrays: Callable[[], dict[str, NDArray[Any]]]
 
 
-def fitted_policy(config: ReinforceConfig, world: World) -> Policy:
-    """Fit the policy to a world; of a `Module` only inputs and outputs are known as sizes."""
-    hidden = config.network.hidden if isinstance(config.network, MLP) else ()
-    spaces = world.n_observations, world.n_actions, world.action_dimensions
-    return make_policy(config.policy, hidden, *spaces)
-
-
 def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator) -> _Agent:
     """Draw the initial weights and set up the engine that learns them."""
-    policy = fitted_policy(config, world)
+    hidden = config.network.hidden if isinstance(config.network, MLP) else ()
+    spaces = world.n_observations, world.n_actions, world.action_dimensions
+    policy = make_policy(config.policy, hidden, *spaces)
     n_sigmas = policy.action_width if policy.gaussian else 0
     if not isinstance(config.network, MLP):
         n_inputs, n_outputs = policy.sizes.tolist()
@@ -376,9 +363,9 @@ def reinforce(
     Returns
     -------
     Run
-        Its arrays hold the last weights, those of an MLP as `layer0.weight` of shape (seeds, inputs,
-        outputs), `layer0.bias` and so on, those of a module under its own names, `log_sigma` for a
-        Gaussian, and copies under `initial/...` and `episode1000/...`.
+        Its arrays hold the last weights, those of an MLP as `layer0.weight` of shape (seeds,
+        inputs, outputs), `layer0.bias` and so on, those of a module under its own names,
+        `log_sigma` for a Gaussian, and copies under `initial/...` and `episode1000/...`.
 
     Raises
     ------
@@ -392,16 +379,13 @@ def reinforce(
     >>> run.table["episode"].tolist(), run.arrays["layer0.weight"].shape
     ([1, 2, 1, 2], (2, 6, 4))
     """
-    check_reinforce(env, config)
+    instance("config", config, ReinforceConfig, "a ReinforceConfig")
 
     def train(training: Training) -> None:
-        with closing(open_world(env)) as world, modules.reproducible():
+        with closing(open_world(env)) as world, modules.reproducible(training.seed):
             _train(world, config, training)
 
+    seeds = one_seed_of(env, seeds)
     return train_seeds(
-        train,
-        episodes=episodes,
-        seeds=one_seed_of(env, seeds),
-        snapshots=snapshots,
-        progress=progress,
+        train, episodes=episodes, seeds=seeds, snapshots=snapshots, progress=progress
     )

@@ -9,7 +9,8 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rl_core import networks
+from rl_core import modules
+from rl_core.kernels import networks
 
 ARCHITECTURES = [(6, 10, 20, 3), (2, 10, 3), (3, 5), (1, 1, 1), (4, 16, 16, 16, 2)]
 BATCHES = [1, 2, 31, 32, 33, 100, 512]
@@ -52,7 +53,7 @@ def plain_loss(sizes, parameters, inputs, output_gradient):
 def test_outputs_are_torchs(sizes, n):
     parameters, inputs, _ = drawn(sizes, n)
     with torch.no_grad():
-        expected = networks.to_torch(sizes, parameters)(torch.from_numpy(inputs)).numpy()
+        expected = modules.perceptron(sizes, parameters)(torch.from_numpy(inputs)).numpy()
     found = networks.output(sizes, parameters, inputs)
     np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5)
 
@@ -61,7 +62,7 @@ def test_outputs_are_torchs(sizes, n):
 @pytest.mark.parametrize("n", BATCHES)
 def test_gradient_is_autograds(sizes, n):
     parameters, inputs, output_gradient = drawn(sizes, n)
-    module = networks.to_torch(sizes, parameters)
+    module = modules.perceptron(sizes, parameters)
     (module(torch.from_numpy(inputs)) * torch.from_numpy(output_gradient)).sum().backward()
     expected = np.concatenate([p.grad.numpy().ravel() for p in module.parameters()])
     found = gradient_of(sizes, parameters, inputs, output_gradient)
@@ -239,7 +240,7 @@ def test_a_network_is_the_same_in_any_stack(n):
 
 def test_torchs_and_numpys_generators_are_left_alone():
     before = torch.get_rng_state(), str(np.random.get_state()), random.getstate()  # noqa: NPY002
-    networks.to_torch((3, 4, 2), np.zeros(26, np.float32))
+    modules.perceptron((3, 4, 2), np.zeros(26, np.float32))
     networks.xavier_uniform((3, 4, 2), np.random.default_rng(0))
     assert torch.equal(before[0], torch.get_rng_state())
     assert before[1:] == (str(np.random.get_state()), random.getstate())  # noqa: NPY002

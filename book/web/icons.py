@@ -15,6 +15,7 @@ logging.getLogger("fontTools").setLevel(logging.WARNING)  # it tells all that it
 RULES = """\
 @font-face {{ font-family: "Font Awesome 6 Free"; font-weight: 900; font-display: block;
   src: url(data:font/woff;base64,{font}) format("woff"); }}
+:root {{ --fa-font-solid: normal 900 1em/1 "Font Awesome 6 Free"; }}
 .fa, .fas, .fa-solid {{ display: inline-block; font-family: "Font Awesome 6 Free";
   font-style: normal; font-weight: 900; line-height: 1; text-rendering: auto; }}
 .fa-lg {{ font-size: 1.25em; line-height: 0.05em; vertical-align: -0.075em; }}
@@ -56,6 +57,7 @@ def style(site: Path) -> str:
              if folder not in file.parents]  # fmt: skip
     names = {name for text in texts for name in re.findall(r"\bfa-([\w-]+)", text)} & set(known)
     direct = {int(code, 16) for text in texts for code in re.findall(r'"\\(f[0-9a-f]{3})"', text)}
+    direct |= {ord(sign) for text in texts for sign in re.findall("[\ue000-\uf8ff]", text)}
     points = sorted(direct | {known[name] for name in names})
     font = base64.b64encode(subset(folder / "webfonts/fa-solid-900.ttf", points)).decode()
     rules = [f'.fa-{name}::before {{ content: "\\{known[name]:x}"; }}' for name in sorted(names)]

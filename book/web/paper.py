@@ -21,18 +21,18 @@ LEFT_OUT = ("api",)
 STYLE = """
     html { font-size: 12px !important; }
     body { background: white; }
-    button, .headerlink, details.hide, .sorts, .toctree-wrapper, .tableofcontents-wrapper,
-    .admonition-title::after { display: none !important; }
+    button:not(th button), .headerlink, details.hide, .sorts, .toctree-wrapper,
+    .tableofcontents-wrapper, .admonition-title::after { display: none !important; }
     article { max-width: 100% !important; padding: 0 !important; }
-    article, .contents { break-before: page; }
+    article { break-before: page; }
     article h1 { margin-top: 0; }
-    .contents ol { list-style: none; padding: 0; }
-    .contents a { display: flex; color: inherit; text-decoration: none; }
-    .contents a::before { content: ""; order: 1; flex: 1; margin: 0 0.5em;
+    .printed-contents ol { columns: 2; column-gap: 3em; list-style: none; padding: 0; }
+    .printed-contents a { display: flex; gap: 0.3em; color: inherit; text-decoration: none; }
+    .printed-contents a::before { content: ""; order: 1; flex: 1; margin: 0 0.5em;
       border-bottom: 1px dotted; }
-    .contents a span { order: 2; }
-    .contents .title { font-weight: bold; margin-top: 0.6em; }
-    .contents .section { margin-left: 1.5em; }
+    .printed-contents .page { order: 2; }
+    .printed-contents .title { break-after: avoid; font-weight: bold; margin-top: 0.6em; }
+    .printed-contents .section { margin-left: 1.5em; }
     .cell_output img, figure img { max-height: 68mm; max-width: 100%; width: auto !important;
       height: auto !important; margin: auto; display: block; }
     .cell_output img[alt^="A picture from the film"] { max-height: 50mm; }
@@ -43,7 +43,7 @@ STYLE = """
     p, li { orphans: 2; widows: 2; }
     figure, img, tr, .math, .thumbnail, .cell:has(img) { break-inside: avoid; }
     .cell:has(img, video) { break-after: avoid; }
-    table { font-size: 0.8em !important; width: 100%; }
+    table { font-size: 0.8em !important; }
     pre { white-space: pre-wrap !important; overflow-wrap: anywhere; }
     div.cell_output, .output, table { overflow: visible !important; }
     td, th { overflow-wrap: break-word; white-space: normal !important; padding: 0.2em 0.4em; }
@@ -92,7 +92,7 @@ def pages(site: Path) -> list[Path]:
 
 def name_of(page: Path, fragment: str) -> str:
     """The address of a place on a page, within the one document."""
-    return f"{page.stem}--{unquote(fragment)}"
+    return f"p{page.stem}--{unquote(fragment)}"
 
 
 def article(page: Path, printed: set[Path]) -> Tag:
@@ -102,6 +102,8 @@ def article(page: Path, printed: set[Path]) -> Tag:
     text["id"] = ""
     for tag in text.find_all(id=True):
         tag["id"] = name_of(page, tag["id"])
+    for style in text.find_all("style"):  # of tables, by their addresses
+        style.string = style.get_text().replace("#T_", f"#{name_of(page, 'T_')}")
     for tag in text.find_all(src=True):
         if "://" not in tag["src"] and not tag["src"].startswith("data:"):
             tag["src"] = (page.parent / unquote(tag["src"])).resolve().as_uri()
@@ -128,7 +130,7 @@ def contents(articles: list[Tag], numbers: dict[str, int]) -> Iterator[str]:
                 link.decompose()
             kind = "title" if heading.name == "h1" else "section"
             number = numbers.get(section["id"], "")
-            title = f"{heading.decode_contents()} <span>{number}</span>"
+            title = f"{heading.decode_contents()} <span class='page'>{number}</span>"
             yield f'<li class="{kind}"><a href="#{section["id"]}">{title}</a></li>'
 
 
@@ -145,8 +147,9 @@ def document(site: Path, numbers: dict[str, int]) -> str:
     lines = "\n".join(contents(articles, numbers))
     return f"""<!doctype html><html lang="en" data-theme="light"><head><meta charset="utf-8">
         <title>{first.title.get_text()}</title>{"".join(styles)}<style>{STYLE}</style>
+        <script>window.MathJax = {{options: {{processHtmlClass: "math"}}}}</script>
         <script src="{mathjax}" defer></script></head><body>
-        <nav class="contents"><h1>Contents</h1><ol>{lines}</ol></nav>
+        <nav class="printed-contents"><h1>Contents</h1><ol>{lines}</ol></nav>
         {front}{"".join(map(str, others))}</body></html>"""
 
 
@@ -185,6 +188,7 @@ def print_page(browser: Browser, page: Path) -> bytes:
             display_header_footer=True,
             header_template="<span></span>",
             footer_template=NUMBER,
+            print_background=True,
             outline=True,
             tagged=True,
         )

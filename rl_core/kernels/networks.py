@@ -155,7 +155,7 @@ def trainable_mask(sizes: Sequence[int], biases: bool) -> NDArray[np.float32]:
 
 
 def output(
-    sizes: Sequence[int], parameters: NDArray[np.float32], inputs: NDArray[np.float32]
+    sizes: Sequence[int], parameters: NDArray[np.float32], inputs: NDArray[np.floating]
 ) -> NDArray[np.float32]:
     """Outputs of one network for many inputs.
 

@@ -114,7 +114,7 @@ def checked_bins(name: str, bins: object) -> int | tuple[int, ...]:
     >>> checked_bins("bins", [10, 20])
     (10, 20)
     """
-    if isinstance(bins, Sequence | np.ndarray) and not isinstance(bins, str):
+    if isinstance(bins, tuple | list | range) or (isinstance(bins, np.ndarray) and bins.ndim):
         require(len(bins) > 0, name, bins, "a positive integer, or one a dimension")
         return integers(name, bins, 1)
     return integer(name, bins, 1)

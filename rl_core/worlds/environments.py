@@ -122,7 +122,7 @@ class GymnasiumWorld:
         seen, reward, terminated, truncated, _ = self._environment.step(native)
         self._see(seen, following)
         if type(reward) is not float:
-            reward = checked_reward(self._environment, reward)
+            reward = checked_reward(self, reward)
         return reward, bool(terminated), bool(truncated)
 
     def _see(self, seen: Any, following: NDArray[np.float32]) -> None:
@@ -134,17 +134,19 @@ class GymnasiumWorld:
             except ValueError:
                 seen = np.asarray(None)
             if seen.shape != self._space.shape:
-                self._refuse(f"an observation of shape {seen.shape} came")
+                self._refuse(f"came an observation of shape {seen.shape}")
         if seen.dtype.kind not in "fiub":
-            self._refuse(f"an observation of type {seen.dtype} came")
+            self._refuse(f"came an observation of type {seen.dtype}")
         following[:] = seen.ravel()
 
     def _refuse(self, what: str) -> None:
-        name = self._environment.spec.id if self._environment.spec else self._environment
         raise ValueError(
-            f"env must keep to its spaces: from {name}, at step {self._steps} of an episode, "
-            f"{what}; its observation space is {self._space}"
+            f"env must keep to its observation space {self._space}, from {self}, {what}"
         )
+
+    def __str__(self) -> str:
+        name = self._environment.spec.id if self._environment.spec else self._environment
+        return f"{name}, at step {self._steps} of an episode"
 
     def close(self) -> None:
         """Close the environment if it was made here."""
@@ -155,8 +157,8 @@ class GymnasiumWorld:
 World = TaskWorld | GymnasiumWorld
 
 
-def checked_reward(env: gymnasium.Env[Any, Any], reward: Any) -> float:
-    """Return a reward as a float, if it is one number.
+def checked_reward(env: object, reward: Any) -> float:
+    """Return a reward from an environment, of which errors tell, as a float if it is one number.
 
     Raises
     ------
@@ -171,7 +173,7 @@ def checked_reward(env: gymnasium.Env[Any, Any], reward: Any) -> float:
     single = isinstance(reward, np.ndarray) and reward.size == 1
     number = reward.item() if single or isinstance(reward, np.generic) else reward
     if not isinstance(number, Real):
-        raise ValueError(f"env must pay a number as reward, from {env} came {reward!r}")
+        raise ValueError(f"env must pay a number as reward, from {env}, came {reward!r}")
     return float(number)
 
 
@@ -307,7 +309,7 @@ def one_seed_of(env: object, seeds: Iterable[int]) -> Iterable[int]:
     ValueError: env must be an id or a function that makes an environment where there are several...
     """
     seeds = tuple(seeds) if isinstance(seeds, Iterable) else seeds
-    if isinstance(env, gymnasium.Env) and len(seeds) > 1:
+    if isinstance(env, gymnasium.Env) and isinstance(seeds, tuple) and len(seeds) > 1:
         raise ValueError(
             "env must be an id or a function that makes an environment where there are several "
             f"seeds, which would share what one environment remembers, got {env!r}"
