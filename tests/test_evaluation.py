@@ -26,7 +26,7 @@ from rl_core.kernels.likelihood import Policy
 from rl_core.policies import MLP, Gaussian, Module
 from rl_core.reinforce import ReinforceConfig, reinforce
 from rl_core.training import spawn_streams, weights_of
-from rl_core.worlds.discretise import Discretised, binned
+from rl_core.worlds.discretise import Discretised, gridded
 
 PUMP = {"layer0.weight": np.array([[1e-7, 0, -1e-7], [-1, 0, 1]], np.float32)}
 """Push the way the car moves, and to the right from rest: Q(s, a) = (a - 1) (v - 1e-7 x)."""
@@ -77,7 +77,7 @@ def test_starts_are_the_same_for_every_agent():
 
 def test_a_table_is_evaluated_from_the_starts_of_the_networks():
     """A grid that tells left from right in velocity only holds the same policy as the network."""
-    world = binned("MountainCar-v0", (1, 2))
+    world = gridded("MountainCar-v0", (1, 2))
     Q = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     found = evaluate_table(world, Q, seed=3, episodes=10, max_steps=10_000)
     network = evaluate("MountainCar-v0", of_values(PUMP), seed=3, episodes=10, max_steps=10_000)
@@ -157,7 +157,7 @@ def test_any_other_environment():
 
 
 def test_under_a_limit_the_same_episodes_are_cut():
-    world = binned("MountainCarContinuous-v0", (1, 2), levels=3)
+    world = gridded("MountainCarContinuous-v0", (1, 2), levels=3)
     Q = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     network = {"layer0.weight": np.array([[0], [50]]), "log_sigma": np.array([-3])}
     agent = as_learned(
@@ -187,12 +187,12 @@ def test_bad_arguments():
         arguments = {"seed": 0, "episodes": 1, "max_steps": 5} | bad
         with pytest.raises((TypeError, ValueError), match=f"^{next(iter(bad))} must be .*, got "):
             evaluate("MountainCar-v0", agent, **arguments)
-        world = binned("MountainCar-v0", 5)
+        world = gridded("MountainCar-v0", 5)
         with pytest.raises((TypeError, ValueError), match=f"^{next(iter(bad))} must be .*, got "):
             evaluate_table(world, np.zeros(world.shape), **arguments)
     with pytest.raises(ValueError, match="agent must be a network of 6 inputs"):
         evaluate("Acrobot-v1", agent, seed=0, episodes=1, max_steps=5)
-    with pytest.raises(TypeError, match="^agent must be an Agent, got None"):
+    with pytest.raises(TypeError, match=r"^agent must be an Agent, got None"):
         evaluate("Acrobot-v1", None, seed=0, episodes=1, max_steps=5)
 
 
@@ -227,7 +227,7 @@ def test_an_agent_that_does_not_fit_its_environment_is_refused(env, agent, messa
     ],
 )
 def test_a_table_of_something_else_is_refused(Q, message):
-    world = binned("MountainCar-v0", 5)
+    world = gridded("MountainCar-v0", 5)
     with pytest.raises((TypeError, ValueError), match=f"^Q must be {message}"):
         evaluate_table(world, Q, seed=0, episodes=1, max_steps=5)
 
