@@ -148,7 +148,7 @@ def one_of(name: str, value: object, words: Collection[str]) -> str:
     if not isinstance(value, str):
         _refuse(TypeError, name, value, allowed)
     require(value in words, name, value, allowed)
-    return value
+    return str(value)
 
 
 def optional(name: str, value: object, check: Callable[..., Any], *bounds: Any) -> Any:
@@ -226,8 +226,7 @@ def floats(
         given = np.asarray(values)
     except ValueError:  # ragged nesting
         _refuse(ValueError, name, values, wanted)
-    numbers = given.dtype != object or all(isinstance(x, Real) for x in given.ravel())
-    if given.size and (given.dtype.kind not in "iufO" or not numbers):
+    if given.dtype.kind not in "iufO" and given.size:
         _refuse(TypeError, name, given.dtype, wanted)
     fits = given.ndim == len(shape) and all(
         n in (None, length) for n, length in zip(shape, given.shape, strict=True)
