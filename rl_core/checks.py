@@ -226,7 +226,8 @@ def floats(
         given = np.asarray(values)
     except ValueError:  # ragged nesting
         _refuse(ValueError, name, values, wanted)
-    if given.dtype.kind not in "iufO" and given.size:
+    numbers = given.dtype != object or all(isinstance(x, Real) for x in given.ravel())
+    if given.size and (given.dtype.kind not in "iufO" or not numbers):
         _refuse(TypeError, name, given.dtype, wanted)
     fits = given.ndim == len(shape) and all(
         n in (None, length) for n, length in zip(shape, given.shape, strict=True)

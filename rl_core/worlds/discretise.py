@@ -119,8 +119,7 @@ def checked_bins(name: str, bins: object) -> int | tuple[int, ...]:
     >>> checked_bins("bins", [10, 20])
     (10, 20)
     """
-    bins = bins.tolist() if isinstance(bins, np.ndarray) else bins
-    if isinstance(bins, Sequence) and not isinstance(bins, str):
+    if isinstance(bins, tuple | list | range) or (isinstance(bins, np.ndarray) and bins.ndim):
         require(len(bins) > 0, name, bins, "a positive integer, or one a dimension")
         return integers(name, bins, 1)
     return integer(name, bins, 1)

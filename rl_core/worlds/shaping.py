@@ -103,14 +103,14 @@ class Shaping:
     code: str = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        imported("shaping", self.function)
+        imported("function", self.function)
         try:
             compiled_shape(self.function)
         except (AttributeError, TypeError, ValueError, numba.NumbaError) as error:
             reason = str(error).strip().splitlines()[0] if str(error).strip() else "no reason given"
             raise ValueError(
-                "shaping must name a function f(observation, reward) -> float that numba compiles, "
-                f"got {self.function!r} ({reason})"
+                "function must be an import path of f(observation, reward) -> float that numba "
+                f"compiles, got {self.function!r} ({reason})"
             ) from error
         object.__setattr__(self, "code", code_behind(self.function))
 
