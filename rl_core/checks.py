@@ -148,7 +148,7 @@ def one_of(name: str, value: object, words: Collection[str]) -> str:
     if not isinstance(value, str):
         _refuse(TypeError, name, value, allowed)
     require(value in words, name, value, allowed)
-    return value
+    return str(value)
 
 
 def optional(name: str, value: object, check: Callable[..., Any], *bounds: Any) -> Any:
