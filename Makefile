@@ -60,7 +60,7 @@ chapter: setup ## execute and build one chapter alone: make chapter N=3
 		$(filter book/0$(N)_% book/$(N)_%,$(NOTEBOOKS)))),$(error there is no chapter $(N)))
 
 lab: setup ## open the chapters in JupyterLab, with the Python of .venv
-	$(RUN) jupyter lab --ServerApp.root_dir=book --ServerApp.port=0 $(LAB)
+	$(RUN) python -m jupyterlab --ServerApp.root_dir=book --ServerApp.port=0 $(LAB)
 
 zip: book ## the site as one file, _build/book.zip, which opens without a network or a server
 	@$(STAMP) _build/.zip --in $(COMPLETE) -- python -m zipfile -c _build/book.zip $(SITE)
