@@ -287,9 +287,9 @@ def opened(env: Any) -> gymnasium.Env[Any, Any]:
         try:
             made = env()
         except TypeError as error:
-            raise TypeError(f"env must be a function without arguments, got {env!r}: {error}") from (
-                error
-            )
+            raise TypeError(
+                f"env must be a function without arguments, got {env!r}: {error}"
+            ) from (error)
     if not isinstance(made, gymnasium.Env):
         raise TypeError(
             "env must be a Gymnasium id, an import path, a task, an environment or a function that "
