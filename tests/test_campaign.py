@@ -98,7 +98,7 @@ CALLS: list[tuple[Callable, dict]] = [
     (random_maze, {"rows": 4, "columns": 4, "flags": 1, "wall_fraction": 0.1, "rng": rng()}),
     (policies.MLP, {"hidden": (3,), "biases": True}),
     (policies.Module, {"function": "torch.nn:Linear"}),
-    (policies.Gaussian, {field.name: getattr(Gaussian(), field.name) for field in fields(Gaussian)}),
+    (policies.Gaussian, {f.name: getattr(Gaussian(), f.name) for f in fields(Gaussian)}),
     (ReinforceConfig, {f.name: getattr(LINEAR, f.name) for f in fields(LINEAR)}),
     (DQNConfig, {f.name: getattr(SMALL, f.name) for f in fields(SMALL)}),
     (QLearningConfig, {f.name: getattr(TABULAR, f.name) for f in fields(TABULAR)}),
