@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from rl_core import dynamics
+from rl_core.worlds.twins import TASKS
 from studies.fastest import fastest
 
 STARTS = np.linspace(-0.6, -0.4, 21)
@@ -23,10 +23,10 @@ def test_finer_grids_agree_better(name):
 
 
 def _steps(name, start, forces):
-    state = np.array([start, 0.0, 0.0, 0.0])
-    code = dynamics.TASKS[name].code
+    kernel = TASKS[name].kernel()
+    kernel.state[0] = start
     for t, force in enumerate(forces, 1):
-        if dynamics.step(code, state, np.array([force], np.float32))[1]:
+        if kernel.step(kernel.state, np.array([force], np.float32))[1]:
             return t
     return np.inf
 
