@@ -16,11 +16,11 @@ from scipy import stats
 
 from rl_core import epsilon, networks, q_update, replay
 from rl_core.dqn import DQNConfig, dqn
-from rl_core.episodes import spawn_streams
 from rl_core.epsilon import Decay, HalfWay
 from rl_core.experiments import Arm
 from rl_core.experiments import run as run_arms
 from rl_core.q_update import COPIES, DUE, NOTHING, Settings, make_learner
+from rl_core.worlds.episodes import spawn_streams
 from rl_core.worlds.shaping import Shaping, compiled_shape
 
 SMALL = DQNConfig(
