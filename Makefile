@@ -4,19 +4,23 @@ SHELL := bash
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := help
 
-PYTHON ?= $(firstword $(shell command -v python3.11 python3))
+# The Python of .venv, or else the newest installed one that can make it.
+PYTHON ?= $(if $(wildcard .venv/bin/python),.venv/bin/python,$(shell for python in \
+	python3.13 python3.12 python3.11 python3; do "$$python" -c 'import sys, venv, ensurepip; \
+	sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && echo "$$python" && break; done))
 BIN := .venv/bin
+# What executes anything does so apart from the reader's settings; what is up to date is not made again.
+RUN := $(BIN)/python book/web/isolation.py
+STAMP := $(RUN) python book/web/stamp.py
 # In the order in which they are run: the appendices and the front page read what the chapters wrote.
-NOTEBOOKS := $(sort $(wildcard book/[0-9]*.ipynb)) $(sort $(wildcard book/a[0-9]*.ipynb)) book/intro.ipynb
+NOTEBOOKS := $(wildcard $(patsubst %,%.ipynb,$(shell sed -nE 's/^ *- file: *//p; s/^root: *//p' _toc.yml | sed '1{h;d};$$G')))
 SITE := _build/html
 # The setting the site was built with is part of the stamp's name: a preview is never taken for the book.
-STAMP := $(SITE)/.complete-$(or $(SEEDS),30)-seeds
-BOOK_SOURCES := _config.yml _toc.yml environment.txt $(wildcard book/*.md book/*.py book/*/*.py book/_static/*) \
-	$(NOTEBOOKS) $(shell find rl_core book/data -type f -not -path '*/__pycache__/*' 2>/dev/null)
+COMPLETE := $(SITE)/.complete-$(or $(SEEDS),30)-seeds
+SOURCES := _config.yml _toc.yml environment.txt book rl_core
 
 # `make book SEEDS=3` is a first look with fewer seeds; no other target takes the setting.
 unexport SEEDS
-PREVIEW := $(if $(filter-out 30,$(SEEDS)),_build/preview)
 ifneq ($(SEEDS),)
 PROBLEM := $(shell SEEDS='$(SEEDS)' "$(PYTHON)" book/report/seeds.py 2>&1 | tail -n 1)
 ifneq ($(PROBLEM),)
@@ -24,87 +28,83 @@ $(error $(PROBLEM))
 endif
 endif
 
-# One thread a process: the parallelism is over seeds, and results must not depend on core counts.
-export OMP_NUM_THREADS := 1
-export MKL_NUM_THREADS := 1
-export SDL_VIDEODRIVER := dummy
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
-export PYDEVD_DISABLE_FILE_VALIDATION := 1
 
-.PHONY: help setup book pdf picture test lint types unit pairing notebooks browser sync bench clean
+.PHONY: help setup book chapter lab zip pdf picture test lint types unit pairing notebooks browser hostile \
+	sync bench clean .venv/install
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
-setup: .venv/.installed ## make .venv with the pinned environment and the package
+setup: ## make .venv with the pinned environment and the package
+	@test -n "$(PYTHON)" || { echo "Python 3.11, 3.12 or 3.13 with venv is needed and was not found;" \
+		"say where it is: make PYTHON=/path/to/python"; exit 1; }
+	@"$(PYTHON)" book/web/stamp.py .venv/.installed --in environment.txt --in pyproject.toml \
+		--also "$$("$(PYTHON)" --version)" -- $(MAKE) --no-print-directory PYTHON="$(PYTHON)" .venv/install
 
-.venv/.installed: environment.txt pyproject.toml
-	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' \
-		|| { echo "Python 3.11 is needed, $(PYTHON) is another; say which: make PYTHON=/path/to/python3.11"; exit 1; }
-	@echo "Setting up .venv (first time: a few minutes, mostly downloads)"
-	@test -x $(BIN)/python || "$(PYTHON)" -m venv .venv
-	@$(BIN)/pip install --quiet --requirement environment.txt
-	@$(BIN)/pip install --quiet --no-build-isolation --no-deps --editable .
-	@touch $@
+# An environment that is there stays, with what was put into it by hand, unless its Python is another.
+.venv/install:
+	@echo "Setting up .venv with $$("$(PYTHON)" --version) (first time: a few minutes, mostly downloads)"
+	@test "$$($(BIN)/python --version 2>&1)" = "$$("$(PYTHON)" --version)" || "$(PYTHON)" -m venv --clear .venv
+	@$(BIN)/python -m pip install --quiet --requirement environment.txt
+	@$(BIN)/python -m pip install --quiet --no-build-isolation --no-deps --editable .
 
-book: $(STAMP) ## execute the notebooks, build the site into _build/html (first look: make book SEEDS=3)
-	@echo "The $(if $(PREVIEW),preview ($(SEEDS) seeds),book) is at file://$(CURDIR)/$(SITE)/index.html"
+book: setup ## execute the notebooks, build the site into _build/html (first look: make book SEEDS=3)
+	@SEEDS=$(SEEDS) $(STAMP) $(COMPLETE) $(SOURCES:%=--in %) --also "$$($(BIN)/python --version)" \
+		-- python book/web/build.py
+	@echo "The $(if $(filter-out 30,$(SEEDS)),preview ($(SEEDS) seeds),book) is at file://$(CURDIR)/$(SITE)/index.html"
 
-# Always from nothing: an incremental build passes over warnings in pages it does not read again.
-# A preview is built from a copy of the sources, so that the tables it writes stay out of results/;
-# what it runs is kept in the one store, where the book finds it again.
-$(STAMP): .venv/.installed $(BOOK_SOURCES)
-	@rm -rf _build
-ifneq ($(PREVIEW),)
-	@mkdir -p results/store _build/preview/results
-	@cp -r _config.yml _toc.yml book _build/preview
-	@ln -s ../../../results/store _build/preview/results/store
-endif
-	SEEDS=$(SEEDS) $(BIN)/jupyter-book build $(or $(PREVIEW),.) --path-output . --warningiserror --nitpick --keep-going
-	@touch $@
+chapter: setup ## execute and build one chapter alone: make chapter N=3
+	@test -n "$(N)" || { echo "which one? make chapter N=3"; exit 1; }
+	@SEEDS=$(SEEDS) $(RUN) python book/web/build.py --only $(or $(notdir $(basename \
+		$(filter book/0$(N)_% book/$(N)_%,$(NOTEBOOKS)))),$(error there is no chapter $(N)))
 
-pdf: _build/book.pdf ## print the book to one file, _build/book.pdf (needs Chromium)
-	@echo "The printed book is at file://$(CURDIR)/$<"
+lab: setup ## open the chapters in JupyterLab, with the Python of .venv
+	$(RUN) python -m jupyterlab --ServerApp.root_dir=book --ServerApp.port=0 $(LAB)
 
-# The book once more on a single page, from what Sphinx kept of the pages of the site.
-_build/book.pdf: $(STAMP)
-	SEEDS=$(SEEDS) $(BIN)/jupyter-book build $(or $(PREVIEW),.) --path-output . --builder singlehtml
-	@cp _build/singlehtml/book/intro.html _build/singlehtml/printed.html
-	PYTHONPATH=book $(BIN)/python -m web.paper _build/singlehtml/printed.html $@
+zip: book ## the site as one file, _build/book.zip, which opens without a network or a server
+	@$(STAMP) _build/.zip --in $(COMPLETE) -- python -m zipfile -c _build/book.zip $(SITE)
+	@echo "The site is in $(CURDIR)/_build/book.zip: unpack it, open html/index.html"
 
-picture: $(STAMP) ## take the README's picture from the built front page (needs Chromium)
-	PYTHONPATH=book $(BIN)/python -m web.portrait $(SITE)/book/intro.html .github/readme.png
+pdf: book ## print the book to one file, _build/book.pdf (needs Chromium)
+	@$(STAMP) _build/.pdf --in $(COMPLETE) --in book/web/paper.py --in book/web/chromium.py -- \
+		python book/web/paper.py $(SITE) _build/book.pdf
+	@echo "The printed book is at file://$(CURDIR)/_build/book.pdf"
+
+picture: book ## take the README's picture from the built front page (needs Chromium)
+	$(RUN) python book/web/portrait.py $(SITE)/book/intro.html .github/readme.png
 
 test: lint types unit pairing notebooks browser ## all that has to pass: style, types, tests, notebooks, pages
 
-lint: .venv/.installed ## style and format (ruff)
+lint: setup ## style and format (ruff)
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 
-types: .venv/.installed ## types (mypy, strict)
+types: setup ## types (mypy, strict)
 	$(BIN)/mypy
 
-unit: .venv/.installed ## unit tests and the examples in the docstrings
-	$(BIN)/pytest
+unit: setup ## unit tests and the examples in the docstrings
+	$(RUN) pytest
 
-pairing: .venv/.installed ## each notebook says the same as its .py twin and holds no outputs
-	$(BIN)/pytest tests/pairing.py
+pairing: setup ## each notebook says the same as its .py twin and holds no outputs
+	$(RUN) pytest tests/pairing.py
 
-notebooks: .venv/.installed ## every notebook at full scale (nbmake)
-	$(BIN)/pytest --nbmake --nbmake-timeout=5400 -o faulthandler_timeout=0 --durations=0 $(NOTEBOOKS)
+notebooks: setup ## every notebook at full scale (nbmake)
+	$(RUN) pytest --nbmake --nbmake-timeout=5400 -o faulthandler_timeout=0 --durations=0 $(NOTEBOOKS)
 
-browser: $(STAMP) ## the built book: claims, links; in a headless Chromium pictures, mathematics, films, search
-	$(BIN)/pytest tests/built_book.py tests/browser.py
+browser: book ## the built book: claims, links; in a headless Chromium pictures, mathematics, films, search
+	$(RUN) pytest tests/built_book.py tests/browser.py tests/interactive_browser.py
 
-sync: .venv/.installed ## write the .ipynb twins anew from the .py files
+hostile: setup ## a small book built among hostile settings has the same pictures and claims
+	$(RUN) pytest tests/hostile.py
+
+sync: setup ## write the .ipynb twins anew from the .py files
 	$(BIN)/jupytext --update --to ipynb $(NOTEBOOKS:.ipynb=.py)
 
-bench: .venv/.benchmarks ## speed ratios against other libraries, measured now on this machine
-	$(BIN)/python -m bench
-
-.venv/.benchmarks: .venv/.installed bench/environment.txt
-	@$(BIN)/pip install --quiet --requirement environment.txt --requirement bench/environment.txt
-	@touch $@
+bench: setup ## speed ratios against other libraries, measured now on this machine
+	@"$(PYTHON)" book/web/stamp.py .venv/.benchmarks --in environment.txt --in bench/environment.txt -- \
+		$(BIN)/python -m pip install --quiet --requirement environment.txt --requirement bench/environment.txt
+	$(RUN) python -m bench
 
 clean: ## remove what was built and measured (keeps .venv)
 	rm -rf _build results

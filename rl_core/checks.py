@@ -148,7 +148,7 @@ def one_of(name: str, value: object, words: Collection[str]) -> str:
     if not isinstance(value, str):
         _refuse(TypeError, name, value, allowed)
     require(value in words, name, value, allowed)
-    return value
+    return str(value)
 
 
 def optional(name: str, value: object, check: Callable[..., Any], *bounds: Any) -> Any:
@@ -178,7 +178,8 @@ def integers(
     >>> integers("seeds", np.arange(3))
     (0, 1, 2)
     """
-    if not isinstance(values, Iterable) or isinstance(values, str | bytes):
+    scalar = isinstance(values, str | bytes) or (isinstance(values, np.ndarray) and not values.ndim)
+    if scalar or not isinstance(values, Iterable):
         _refuse(TypeError, name, values, f"a sequence of integers from {least}")
     return tuple(integer(name, value, least, most) for value in values)
 
@@ -226,7 +227,8 @@ def floats(
         given = np.asarray(values)
     except ValueError:  # ragged nesting
         _refuse(ValueError, name, values, wanted)
-    if given.dtype.kind not in "iufO" and given.size:
+    numbers = given.dtype != object or all(isinstance(x, Real) for x in given.ravel())
+    if given.size and (given.dtype.kind not in "iufO" or not numbers):
         _refuse(TypeError, name, given.dtype, wanted)
     fits = given.ndim == len(shape) and all(
         n in (None, length) for n, length in zip(shape, given.shape, strict=True)

@@ -26,21 +26,11 @@ from typing import Any, Literal
 
 import numpy as np
 import torch
-from numba.extending import overload, register_jitable
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from rl_core import modules
-from rl_core.checks import (
-    fields,
-    instance,
-    integer,
-    number,
-    one_of,
-    optional,
-    positive,
-    require,
-    truth,
-)
+from rl_core.checks import fields, instance, integer, number, one_of, optional, positive, truth
 from rl_core.exploration import Epsilon, HalfWay, check_epsilon, schedule_state
 from rl_core.kernels import networks, q_update
 from rl_core.kernels.choices import VALUE, after_copy, after_goal, after_step, greedy_action
@@ -57,7 +47,7 @@ from rl_core.worlds.environments import (
     open_world,
     step,
 )
-from rl_core.worlds.shaping import ORIGINAL, Shaping, compiled_shape, shaped_reward
+from rl_core.worlds.shaping import Shaping, shape_for, shaped_reward
 
 WENT_ON, DIVERGED, SHAPED_NAN = range(3)
 """How an episode's learning went: a loss was not finite, or a shaped reward was NaN."""
@@ -77,10 +67,9 @@ class DQNConfig:
         With TensorFlow 1's constants (`rl_core.kernels.networks`).
     learning_rate : float
         The optimiser's step size alpha, above 0.
-    batch_size : int
-        Transitions an update.
-    memory_size : int
-        Transitions kept, at least a batch. As many as a batch: no replay, only the latest ones.
+    batch_size, memory_size : int
+        Transitions an update, and transitions kept, at least a batch. As many as a batch: no
+        replay, only the latest ones.
     learning_starts, update_every : int
         Environment steps before the first update (the report waits until the memory is full), and
         from one to the next.
@@ -88,22 +77,18 @@ class DQNConfig:
         Updates between two copies to the fixed network. 1: no fixed target.
     epsilon : float, Linear or HalfWay
         Probability that a run of one random action begins, where none is going on (the report's
-        epsilon is 1 minus it).
+        epsilon is 1 minus it). A schedule is by the environment step.
     persistence : int
-        Steps p of such a run, at most to the end of the episode. 1: the usual epsilon-greedy, and
-        epsilon the share of random steps. Else that share is larger, p epsilon / (p epsilon + 1 -
-        epsilon) (W. Dabney, G. Ostrovski and A. Barreto 2021, Temporally-extended epsilon-greedy
-        exploration).
+        Steps p of such a run, at most to the end of the episode. 1: the usual epsilon-greedy. Else
+        the share of random steps is larger, p epsilon / (p epsilon + 1 - epsilon) (W. Dabney et al.
+        2021, Temporally-extended epsilon-greedy exploration).
     shaping : Shaping or None
         What is learned from in place of the environment's reward. None: that reward.
     bootstrap_through_end : bool
         Whether terminal states are given the value the network puts on them, as in the 2018
         program, which kept no terminal flag. False is right.
-    max_episode_steps : int or None
-        Where to stop an episode that has not ended. None: nowhere.
-    max_env_steps : int or None
-        Budget of environment steps a seed: where it is used up the last episode is stopped. None:
-        no limit.
+    max_episode_steps, max_env_steps : int or None
+        Where to stop an episode that has not ended, and a whole seed. None: nowhere.
     engine : {"compiled", "torch"} or None
         What learns. None: machine code for an MLP, torch for a Module.
 
@@ -150,9 +135,7 @@ class DQNConfig:
             max_env_steps=(optional, integer, 1),
             **dict.fromkeys(counts, (integer, 1)),
         )
-        allowed = f"an integer of at least batch_size ({self.batch_size})"
-        size = integer("memory_size", self.memory_size, 1)
-        require(size >= self.batch_size, "memory_size", size, allowed)
+        fields(self, memory_size=(integer, self.batch_size))
         object.__setattr__(self, "engine", check_network(self.network, self.engine))
 
 
@@ -190,7 +173,8 @@ class TorchLearner:
             if not self.settings.through_end:
                 y = torch.where(end, r, y)
         q = self.network(s).gather(1, a[:, None]).squeeze(1)
-        return ((y - q) ** 2).mean()
+        loss: torch.Tensor = ((y - q) ** 2).mean()
+        return loss
 
     def update(self, memory: Memory) -> bool:
         """Take one step of the optimiser, and copy the network when it is time.
@@ -201,7 +185,7 @@ class TorchLearner:
         if not torch.isfinite(loss):
             return False
         self.optimiser.zero_grad()
-        loss.backward()
+        loss.backward()  # type: ignore[no-untyped-call]
         self.optimiser.step()
         self.counts[UPDATES] += 1
         if self.counts[UPDATES] % self.settings.copy_every == 0:
@@ -213,43 +197,16 @@ class TorchLearner:
     def q_values(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
         """Q(s, .; theta) of one state."""
         with torch.no_grad():
-            return self.network(torch.from_numpy(observation)[None])[0].numpy().astype(np.float64)
-
-
-def q_values(learner: Learner | TorchLearner, observation: NDArray[np.float32]) -> Any:
-    """Q(s, .; theta) of one state, float64 of shape (A,)."""
-    if isinstance(learner, Learner):
-        return q_update.q_values(learner, observation)
-    return learner.q_values(observation)
-
-
-def update(learner: Learner | TorchLearner, memory: Memory) -> bool:
-    """Move theta towards the targets of the sampled batch; false if the loss is not finite."""
-    if isinstance(learner, Learner):
-        return q_update.update(learner, memory)
-    return learner.update(memory)
-
-
-# What the two mean in compiled code.
-overload(q_values)(
-    lambda learner, observation: (
-        lambda learner, observation: q_update.q_values(learner, observation)
-    )
-)
-overload(update)(lambda learner, memory: lambda learner, memory: q_update.update(learner, memory))
+            values: torch.Tensor = self.network(torch.from_numpy(observation)[None])[0]
+        return values.numpy().astype(np.float64)
 
 
 @register_jitable
 def act(learner: Any, observation: NDArray[np.float32], u: float, v: float) -> int:
     """Act epsilon-greedily; a random action is kept for `persistence` steps.
 
-    Parameters
-    ----------
-    learner : Learner or TorchLearner
-        Its `counts` are changed.
-    observation : float32 array of shape (n_observations,)
-    u, v : float
-        Uniforms in [0, 1): u decides whether to explore, v picks among random or tied actions.
+    Of the uniforms u, v in [0, 1), u decides whether to explore, v picks among random or tied
+    actions. `learner.counts` are changed.
 
     Examples
     --------
@@ -264,7 +221,7 @@ def act(learner: Any, observation: NDArray[np.float32], u: float, v: float) -> i
         counts[KEPT] -= 1
         return int(counts[ACTION])
     if u >= learner.epsilon[VALUE]:
-        return int(greedy_action(q_values(learner, observation), v))
+        return int(greedy_action(q_update.q_values(learner, observation), v))
     counts[KEPT] = learner.settings.persistence - 1
     counts[ACTION] = int(v * learner.settings.n_actions)
     return int(counts[ACTION])
@@ -302,7 +259,7 @@ def play(
         after_step(learner.epsilon, counts[STEPS])
         if counts[STEPS] >= settings.learning_starts and counts[STEPS] % settings.update_every == 0:
             sample(memory, replay_rng.random(settings.batch_size), learner.slots)
-            if not update(learner, memory):
+            if not q_update.update(learner, memory):
                 return t, total, False, DIVERGED
         observation[:] = following
     counts[KEPT] = 0
@@ -318,27 +275,17 @@ def _make_learner(
     config: DQNConfig, world: World, rng: np.random.Generator
 ) -> tuple[Learner | TorchLearner, Callable[[], dict[str, NDArray[Any]]]]:
     """Draw the initial weights; return who learns them, and what gives them by name."""
-    require(world.n_actions > 0, "env", "a Box action space", "an environment of Discrete actions")
-    settings = Settings(
-        config.gamma,
-        config.batch_size,
-        config.learning_starts,
-        config.update_every,
-        config.copy_every,
-        config.persistence,
-        config.learning_rate,
-        config.optimiser == "adam",
-        config.bootstrap_through_end,
-        world.n_actions,
-    )
+    if world.n_actions == 0:
+        raise ValueError("env must have a Discrete action space, got a Box")
+    same = {name: getattr(config, name) for name in Settings._fields if hasattr(config, name)}
+    adam, through_end = config.optimiser == "adam", config.bootstrap_through_end
+    settings = Settings(**same, adam=adam, through_end=through_end, n_actions=world.n_actions)
     epsilon = schedule_state(config.epsilon)
     if not isinstance(config.network, MLP):
         module = modules.make_module(config.network, world.n_observations, world.n_actions, rng)
         return TorchLearner(module, settings, epsilon), partial(modules.as_arrays, module)
-    sizes, biases = (
-        (world.n_observations, *config.network.hidden, world.n_actions),
-        config.network.biases,
-    )
+    sizes = world.n_observations, *config.network.hidden, world.n_actions
+    biases = config.network.biases
     parameters = networks.xavier_uniform(sizes, rng)
 
     def layers() -> dict[str, NDArray[Any]]:
@@ -358,7 +305,7 @@ def _train(world: World, config: DQNConfig, training: Training) -> None:
     learner, arrays = _make_learner(config, world, streams.network)
     training.keep("initial/", arrays())
     memory = make_memory(config.memory_size, world.n_observations)
-    shape = compiled_shape(config.shaping.function if config.shaping else ORIGINAL)
+    shape = shape_for(config.shaping, world.n_observations)
     rngs = streams.policy, streams.replay
     both = isinstance(world, TaskWorld) and isinstance(learner, Learner)
     play_episode = _play_compiled if both else play
@@ -370,8 +317,8 @@ def _train(world: World, config: DQNConfig, training: Training) -> None:
         )
         if outcome == SHAPED_NAN and config.shaping is not None:
             raise ValueError(
-                f"shaping {config.shaping.function!r} returned NaN at step {steps} of episode "
-                f"{episode}, seed {training.seed}"
+                f"shaping must return numbers, {config.shaping.function!r} returned NaN at step "
+                f"{steps} of episode {episode}, seed {training.seed}"
             )
         training.add(steps, total, terminated)
         if outcome == DIVERGED or not all(np.isfinite(array).all() for array in arrays().values()):
@@ -384,12 +331,6 @@ def _train(world: World, config: DQNConfig, training: Training) -> None:
 def check_dqn(env: EnvironmentLike, config: DQNConfig) -> None:
     """Raise what `dqn` would raise for an environment and a configuration; run nothing.
 
-    Raises
-    ------
-    ValueError, TypeError
-        If `config` is no DQNConfig, the environment unknown, its spaces of another kind, or the
-        network's output of another shape.
-
     Examples
     --------
     >>> check_dqn("MountainCar-v0", DQNConfig())
@@ -397,6 +338,7 @@ def check_dqn(env: EnvironmentLike, config: DQNConfig) -> None:
     instance("config", config, DQNConfig, "a DQNConfig")
     with closing(open_world(env)) as world:
         _make_learner(config, world, np.random.default_rng(0))
+        shape_for(config.shaping, world.n_observations)
 
 
 def dqn(
@@ -414,8 +356,8 @@ def dqn(
     ----------
     env : str, Make, Task, gymnasium.Env or callable
         With Box observations and Discrete actions; see `rl_core.worlds.environments.open_world`.
-        Acrobot-v1 and MountainCar-v0 are played compiled and without time limit. One that is given
-        ready made is for one seed only, as what it remembers would go from seed to seed.
+        One that is given ready made is for one seed only, as what it remembers would go from seed
+        to seed.
     config : DQNConfig
     episodes, seeds, snapshots, progress
         See `rl_core.training.train_seeds`. The initial weights are kept in any case.
@@ -423,16 +365,16 @@ def dqn(
     Returns
     -------
     Run
-        The returns of its table are of the environment's own rewards also where they are shaped. Its
-        arrays hold the last weights, those of an MLP as `layer0.weight` of shape (seeds, inputs,
-        outputs), `layer0.bias` and so on, those of a module under its own names, and copies under
+        Returns are of the environment's own rewards also where they are shaped. The arrays hold the
+        last weights, those of an MLP as `layer0.weight` of shape (seeds, inputs, outputs),
+        `layer0.bias` and so on, those of a module under its own names, and copies under
         `initial/...` and `episode20/...`.
 
     Raises
     ------
     ValueError, TypeError
-        If an argument is out of range, the environment unknown or of other spaces, or a shaped
-        reward NaN.
+        If an argument is not as described, the environment unknown or of other spaces, the
+        network's output of another shape, or a shaping not for what is observed or NaN.
 
     Examples
     --------
@@ -441,10 +383,10 @@ def dqn(
     >>> run.table["steps"].tolist(), run.arrays["layer0.weight"].shape
     ([200, 200, 200, 200], (2, 2, 10))
     """
-    check_dqn(env, config)
+    instance("config", config, DQNConfig, "a DQNConfig")
 
     def train(training: Training) -> None:
-        with closing(open_world(env)) as world, modules.reproducible():
+        with closing(open_world(env)) as world, modules.reproducible(training.seed):
             _train(world, config, training)
 
     seeds = one_seed_of(env, seeds)

@@ -51,7 +51,7 @@ def code_behind(path: str) -> str:
     64
     """
     module = path.partition(":")[0]
-    if sources.is_project(module):
+    if module.split(".")[0] == "rl_core" or sources.is_project(module):
         found = repr(sorted(sources.code([module]).items()))
     else:
         top = importlib.import_module(module.partition(".")[0])

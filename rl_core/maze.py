@@ -6,7 +6,7 @@ is a Gymnasium environment, `Maze.model` its exact model; `random_maze` draws ma
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence, Set
 from typing import Any
 
 import gymnasium as gym
@@ -240,14 +240,14 @@ class Maze(OwnModel, gym.Env[int, int]):
         """The sets of flags in the order of their numbers, each as its letters."""
         return tuple(self._flags_held(i) for i in range(len(self._masks)))
 
-    def state(self, row: int, column: int, flags: Iterable[str] = "") -> int:
+    def state(self, row: int, column: int, flags: Sequence[str] | Set[str] = "") -> int:
         """Return the number of the state with the agent on a cell, holding `flags`.
 
         Parameters
         ----------
         row, column : int
             A cell that is not a wall.
-        flags : iterable of str
+        flags : sequence or set of str
             The letters of the flags held, in any order.
 
         Raises
@@ -267,7 +267,7 @@ class Maze(OwnModel, gym.Env[int, int]):
         )
         checks.require(not self.walls[at], "row, column", at, "a free cell")
         mask = 0
-        for flag in checks.instance("flags", flags, Iterable, "letters of flags"):
+        for flag in checks.instance("flags", flags, Sequence | Set, "letters of flags"):
             known = isinstance(flag, str) and flag in self._bits
             checks.require(known, "flags", flag, f"among {list(self._bits)}")
             mask |= self._bits[flag]

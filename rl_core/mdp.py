@@ -164,6 +164,23 @@ class MDP:
         start = self.start_state[self.start_probability > 0]
         return _reachable(self.successor, self.probability, start)
 
+    def following(self, policy: ArrayLike) -> MDP:
+        """Return the model with one action: that of a policy, an array of an action a state.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If `policy` holds no integers, has another shape, or an action is out of range.
+
+        Examples
+        --------
+        >>> MDP.from_env("FrozenLake-v1").following(np.full(16, 2)).successor.shape
+        (16, 1, 3)
+        """
+        taken = np.arange(self.n_states), checked_policy("policy", policy, self)
+        names = "successor", "probability", "reward"
+        return replace(self, **{name: getattr(self, name)[taken][:, None] for name in names})
+
     @classmethod
     def from_env(
         cls, env: str | gym.Env[Any, Any], start_distribution: ArrayLike | None = None
@@ -276,6 +293,27 @@ class MDP:
         total = float(self.start_probability.sum())
         if abs(total - 1) > SUM_TOLERANCE:
             raise ValueError(f"start_probability must sum to 1, the sum is {total}")
+
+
+def checked_policy(name: str, policy: ArrayLike, mdp: MDP) -> NDArray[np.integer]:
+    """Return `policy` as an array; raise unless it has one of the actions for every state.
+
+    Examples
+    --------
+    >>> checked_policy("policy", [4] * 16, MDP.from_env("FrozenLake-v1"))
+    Traceback (most recent call last):
+    ValueError: policy must be an array of integers from 0 to 3, in state 0 it is 4
+    """
+    checks.floats(name, policy, (mdp.n_states,))
+    actions = np.asarray(policy)
+    allowed = f"an array of integers from 0 to {mdp.n_actions - 1}"
+    if actions.dtype.kind not in "iu":
+        raise TypeError(f"{name} must be {allowed}, got {actions.dtype}")
+    wrong = np.flatnonzero((actions < 0) | (actions >= mdp.n_actions))
+    if len(wrong):
+        found = f"in state {wrong[0]} it is {actions[wrong[0]]}"
+        raise ValueError(f"{name} must be {allowed}, {found}")
+    return actions
 
 
 def _unwrapped(env: gym.Env[Any, Any]) -> gym.Env[Any, Any]:

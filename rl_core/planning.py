@@ -20,7 +20,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -34,7 +34,7 @@ from rl_core import checks
 from rl_core.kernels import bounds, sweeps
 from rl_core.kernels.bounds import error_bound, rounding_error, sweeps_allowed
 from rl_core.kernels.sweeps import TIE, Transitions
-from rl_core.mdp import MDP
+from rl_core.mdp import MDP, checked_policy
 
 DIRECT_LIMIT = 20_000
 """The most states for which equations are solved directly: the factors fill in, to gigabytes."""
@@ -141,7 +141,7 @@ def q_value_iteration(
             residual, squares = sweeps.lookahead(transitions, reward, gamma, V, Q)
             _, _, changes = sweeps.greedy(Q, V, policy)
             norm = math.sqrt(squares)
-            magnitude = max(largest, float(np.abs(V).max()) + residual)
+            magnitude = max(largest, _magnitude(V) + residual)
             bound = error_bound(residual, gamma, rounding_error(mdp.n_successors, magnitude))
             record.add(residual, norm, changes, Q.size, bound)
             if len(record.rows) == 1 and max_sweeps is None:
@@ -191,17 +191,14 @@ def value_iteration(
     ValueError, TypeError
         If an argument is out of range or has the wrong type.
     ArithmeticError
-        If float64 cannot guarantee `tolerance` for this model, or not in a million sweeps because γ
-        is close to 1; the message says what it can.
+        If rounding, or a γ close to 1, keeps the bound above `tolerance`; the message says what
+        can be had.
 
     Notes
     -----
-    *The bound.* A sweep V → V' with contraction factor γ leaves |V' - V*| ≤ γ / (1 - γ) |V' - V|,
-    in the largest entry. In place sweeps have the same factor, and staying solved for even a
-    smaller one, γ (1 - l) / (1 - γ l) for an action that stays with probability l. Two things are
-    added: rows of probabilities may add up to 1 + 1e-9, so the factor is γ (1 + 1e-9); and each
-    backup is off by rounding, at most 2 (K + 1) ε max(|r|, |V|), with ε = 2⁻⁵². So the bound is
-    (γ |V' - V| + rounding) / (1 - γ).
+    *The bound* is (γ |V' - V| + rounding) / (1 - γ) after a sweep V → V', in the largest entry; see
+    `rl_core.kernels.bounds`. Sweeps in place contract by γ as others do, and staying solved for by
+    even less, γ (1 - l) / (1 - γ l) for an action that stays with probability l.
 
     *Memory.* With 4 actions, 2 successors and probabilities shared by all states: 97 bytes a state
     for the model and at most 90 for planning; 8 A K more if states have their own probabilities.
@@ -234,7 +231,7 @@ def value_iteration(
             V[order], policy[order] = V.copy(), policy.copy()
         sweeps.lookahead(transitions, reward, gamma, V, Q)
         residual, squares, changes = sweeps.greedy(Q, V, policy)
-        magnitude = max(magnitude, float(np.abs(V).max()) + residual)
+        magnitude = max(magnitude, _magnitude(V) + residual)
         rounding = rounding_error(mdp.n_successors, magnitude)
         bound = min(bound, error_bound(residual, gamma, rounding))
         record.add(residual, math.sqrt(squares), changes, Q.size, bound, "check")
@@ -321,6 +318,8 @@ def policy_iteration(
     ------
     ValueError, TypeError
         If an argument is out of range or has the wrong type.
+    ArithmeticError
+        If γ is so close to 1 that `evaluation_threshold` is too many sweeps away.
 
     Notes
     -----
@@ -346,7 +345,7 @@ def policy_iteration(
         sweeps.greedy(Q, V, policy)
         Q[:], V[:], first = 0, 0, Q.size
     else:
-        policy[:] = _checked_policy("initial_policy", initial_policy, mdp)
+        policy[:] = checked_policy("initial_policy", initial_policy, mdp)
     states, changes = np.arange(mdp.n_states), -1
     with _recording("policy iteration", progress) as record:
         while changes != 0:
@@ -356,7 +355,7 @@ def policy_iteration(
                 evaluations = _evaluate(mdp, policy, gamma, threshold, V)
             residual, squares = sweeps.lookahead(transitions, reward, gamma, V, Q)
             best = Q.max(axis=1)
-            rounding = rounding_error(mdp.n_successors, max(largest, float(np.abs(V).max())))
+            rounding = rounding_error(mdp.n_successors, max(largest, _magnitude(V)))
             error = (np.abs(Q[states, policy] - V).max() + rounding) / (1 - gamma)
             gain = best - Q[states, policy]
             better = gain > np.maximum(2 * gamma * error, TIE * np.abs(Q).max(axis=1))
@@ -404,7 +403,7 @@ def policy_evaluation(mdp: MDP, policy: ArrayLike, *, gamma: float) -> NDArray[n
     np.float64(0.0288)
     """
     gamma, _, _ = _opened(mdp, gamma)
-    followed = _restricted(mdp, _checked_policy("policy", policy, mdp))
+    followed = mdp.following(policy)
     largest = _largest(followed.reward, gamma) / (1 - gamma)
     if mdp.n_states > DIRECT_LIMIT:
         rounding = 4 * rounding_error(mdp.n_successors, largest) / (1 - gamma)
@@ -452,7 +451,7 @@ def backup(mdp: MDP, V: ArrayLike, *, gamma: float) -> NDArray[np.float64]:
     gamma, transitions, reward = _opened(mdp, gamma)
     values = checks.floats("V", V, (mdp.n_states,))
     _largest(reward, gamma)
-    bounds.check_returns("V", float(np.abs(values).max()), 0.0)
+    bounds.check_returns("V", _magnitude(values), 0.0)
     Q = np.zeros((mdp.n_states, mdp.n_actions))
     sweeps.lookahead(transitions, reward, gamma, values, Q)
     return Q
@@ -532,16 +531,23 @@ def _evaluate(
     V: NDArray[np.float64],
 ) -> int:
     """Sweep V for one policy until no value changes by `threshold`; return how many sweeps."""
-    _, transitions, reward = _opened(_restricted(mdp, policy), gamma)
+    _, transitions, reward = _opened(mdp.following(policy), gamma)
     Q = V[:, None].copy()
     residual, done, limit = math.inf, 0, 1
-    while residual >= threshold and done < limit:  # at the limit only rounding is left
+    while residual >= threshold and done < limit:
         residual, _ = sweeps.lookahead(transitions, reward, gamma, V, Q)
         V[:] = Q[:, 0]
         done += 1
         if done == 1:
             limit += sweeps_allowed(residual, threshold, gamma)
-    return done
+    if residual >= max(
+        threshold, rounding_error(mdp.n_successors, max(_magnitude(reward), _magnitude(V)))
+    ):
+        raise ArithmeticError(
+            f"evaluation_threshold {threshold} is too many sweeps away for gamma {gamma}; ask for "
+            f"{2 * residual:.0e} or more"
+        )
+    return done  # at the limit only rounding is left
 
 
 class _Record:
@@ -576,41 +582,27 @@ def _recording(name: str, progress: bool) -> Iterator[_Record]:
 
 
 def _opened(mdp: MDP, gamma: float) -> tuple[float, Transitions, NDArray[np.float64]]:
-    """Return the discount, checked, and the model's transitions and rewards as kernels take them.
-
-    Probabilities that all states share are given once.
-    """
+    """Return discount, transitions and rewards, checked, as the kernels take them."""
     checks.instance("mdp", mdp, MDP, "an MDP (see MDP.from_env)")
-    shared = mdp.probability.strides[0] == 0 and mdp.n_states > 1
-    probability = np.ascontiguousarray(mdp.probability[:1] if shared else mdp.probability)
-    successor = np.ascontiguousarray(mdp.successor)
-    transitions = Transitions(successor, probability, int(not shared))
-    return bounds.discount(gamma), transitions, np.ascontiguousarray(mdp.reward)
+    found = bounds.discount(gamma)
+    transitions = sweeps.transitions(mdp.successor, mdp.probability)
+    return found, transitions, np.ascontiguousarray(mdp.reward)
 
 
 def _largest(reward: NDArray[np.float64], gamma: float) -> float:
     """Return the largest |r|, checked to be one from which returns can be summed."""
-    largest = max(abs(float(reward.max())), abs(float(reward.min())))
+    largest = _magnitude(reward)
     bounds.check_returns("mdp", largest, gamma)
     return largest
 
 
+def _magnitude(values: NDArray[np.float64]) -> float:
+    """Return the largest absolute value, without an array of them all."""
+    return max(abs(float(values.max())), abs(float(values.min())))
+
+
 def _above_zero(name: str, value: object) -> float:
     return checks.number(name, value, above=0)
-
-
-def _checked_policy(name: str, policy: ArrayLike, mdp: MDP) -> NDArray[np.integer]:
-    """Return `policy` as an array; raise unless it has one of the actions for every state."""
-    checks.floats(name, policy, (mdp.n_states,))
-    actions = np.asarray(policy)
-    allowed = f"an array of integers from 0 to {mdp.n_actions - 1}"
-    if actions.dtype.kind not in "iu":
-        raise TypeError(f"{name} must be {allowed}, got {actions.dtype}")
-    wrong = np.flatnonzero((actions < 0) | (actions >= mdp.n_actions))
-    if len(wrong):
-        found = f"in state {wrong[0]} it is {actions[wrong[0]]}"
-        raise ValueError(f"{name} must be {allowed}, {found}")
-    return actions
 
 
 def _action_values(Q: ArrayLike) -> NDArray[np.float64]:
@@ -625,10 +617,3 @@ def _blank(
     """Return Q and V of zeros, and the policy that always takes action 0."""
     S, A = mdp.n_states, mdp.n_actions
     return np.zeros((S, A)), np.zeros(S), np.zeros(S, dtype=sweeps.action_type(A))
-
-
-def _restricted(mdp: MDP, policy: NDArray[np.integer]) -> MDP:
-    """Return the model with one action: that of the policy."""
-    taken = np.arange(mdp.n_states), policy
-    names = "successor", "probability", "reward"
-    return replace(mdp, **{name: getattr(mdp, name)[taken][:, None] for name in names})

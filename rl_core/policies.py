@@ -86,7 +86,7 @@ class Module:
 
     def __post_init__(self) -> None:
         require(
-            callable(imported("network", self.function)), "network", self.function, "a function"
+            callable(imported("function", self.function)), "function", self.function, "callable"
         )
         object.__setattr__(self, "code", code_behind(self.function))
 

@@ -140,6 +140,8 @@ class QLearningConfig:
             bins=(optional, checked_bins),
             levels=(optional, integer, 2),
         )
+        without = self.bins is None and self.levels is not None
+        require(not without, "levels", self.levels, "None where bins is None")
 
 
 def _checked_step_size(name: str, value: object) -> Any:
@@ -335,14 +337,17 @@ def check_q_learning_on_model(env: object, config: object) -> None:
     """
     instance("env", env, str, "an environment's id")
     instance("config", config, QLearningConfig, "a QLearningConfig")
-    require(config.gamma < 1, "gamma", config.gamma, "below 1, for planning")  # type: ignore[attr-defined]
-    MDP.from_env(env)  # type: ignore[arg-type]
+    assert isinstance(env, str)
+    assert isinstance(config, QLearningConfig)
+    require(config.gamma < 1, "gamma", config.gamma, "below 1, for planning")
+    check_q_learning(MDP.from_env(env), config)
 
 
 @contextmanager
 def _opened(env: Any, config: Any) -> Iterator[tuple[DiscreteWorld, MDP | None, tuple[int, int]]]:
     """Open the world to act in; give it with its model, if it has one, and the shape of Q."""
     if isinstance(env, MDP):
+        require(config.bins is None, "bins", config.bins, "None where states are numbered")
         yield tabular.model_arrays(env), env, (env.n_states, env.n_actions)
         return
     if config.bins is not None and (task := task_of(env)) is not None:
@@ -354,7 +359,7 @@ def _opened(env: Any, config: Any) -> Iterator[tuple[DiscreteWorld, MDP | None, 
     try:
         yield world, tabular.known_model(world), (int(world.observations.n), int(world.actions.n))
     finally:
-        if world.env is not env:
+        if not isinstance(env, gym.Env):  # made here
             world.env.close()
 
 
@@ -568,9 +573,9 @@ def _train(
         task = task._replace(max_steps=max_steps, trial_max_steps=trial_max_steps)
     first, episodes = 0, len(record)
     for last in sorted({*snapshots, episodes}):
+        Q, visits = arrays["Q"], arrays["visits"]
         stopped = learn(
-            *(world, task, yardstick, appraisal, *draws),
-            *(arrays["Q"], arrays["visits"], record, first, last),
+            world, task, yardstick, appraisal, draws[0], draws[1], Q, visits, record, first, last
         )
         ended = stopped < last  # then later snapshots are of the last table
         for j in [j for j, at in enumerate(snapshots) if at == last or (ended and at > last)]:

@@ -3,7 +3,8 @@
 A seed is one independent run of an arm, and the only thing that is resampled here. Measures are
 counts of steps or episodes, so lower is better throughout; negate returns. A seed that never gets
 there counts as infinity rather than being dropped: medians, interquartile means and the probability
-of improvement take infinities as they are.
+of improvement take infinities as they are, of either sign. What would have to average both signs is
+no number, and refused. Values may be integers, truth values, fractions or floats of any width.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,6 +15,16 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
+from rl_core.checks import (
+    distinct_seeds,
+    floats,
+    generator,
+    instance,
+    integer,
+    number,
+    one_of,
+    require,
+)
 from rl_core.kernels.compiled import compiled
 
 Statistic = Callable[..., Any]
@@ -21,7 +32,7 @@ POINTS_AT_ONCE = 64  # bounds the memory of a bootstrap to 5 MB for 10,000 resam
 
 
 class Interval(NamedTuple):
-    """An estimate between its confidence limits.
+    """An estimate between its confidence limits: never outside, not even by rounding.
 
     Attributes
     ----------
@@ -38,14 +49,14 @@ def iqm(values: ArrayLike, axis: int = 0) -> Any:
     """Return the interquartile mean along `axis`: the mean of the middle half.
 
     Of n values, floor(n / 4) are left out at either end (Agarwal et al. 2021, "Deep reinforcement
-    learning at the edge of the statistical precipice"). NaN among the values gives NaN.
+    learning at the edge of the statistical precipice"). NaN among the values gives NaN; infinities
+    of both signs in the middle half are a ValueError.
 
     >>> float(iqm([100.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, -7.0]))
     3.5
     """
-    values = np.asarray(values, dtype=np.float64)
-    middle = stats.trim_mean(values, 0.25, axis=axis)
-    return np.where(np.isnan(values).any(axis=axis), np.nan, middle)
+    values = _array("values", values, 1, 2)
+    return _averaged("values", values, stats.trim_mean, 0.25, axis=axis)
 
 
 def bootstrap_interval(
@@ -69,8 +80,9 @@ def bootstrap_interval(
     Parameters
     ----------
     values : array, shape (seeds,) or (seeds, points)
-        At least one seed. Infinities are values like others. A point that has a NaN gets NaN
-        throughout: no seed is left out silently.
+        At least one seed. Infinities are values like others; a draw that would average both signs
+        reaches as far as either. A curve's point that has a NaN, a seed that stopped, gets NaN
+        throughout: no seed is left out silently. A single number must not be NaN.
     statistic : {np.median, np.mean, iqm}
         What is estimated.
     rng : numpy.random.Generator
@@ -98,8 +110,21 @@ def bootstrap_interval(
     >>> estimate, low, high
     (97.0, 88.0, 120.0)
     """
-    values = _checked_values("values", values)
-    _check_draws(rng, level, resamples)
+    return _bootstrap("values", _array("values", values, 1, 2), statistic, rng, level, resamples)
+
+
+def _bootstrap(
+    name: str,
+    values: NDArray[np.float64],
+    statistic: Statistic,
+    rng: np.random.Generator,
+    level: float,
+    resamples: int,
+    anything: float | None = None,
+) -> Interval:
+    level, resamples = _checked_draws(rng, level, resamples)
+    unknown = np.isnan(values.T).any(axis=-1)
+    require(values.ndim == 2 or not unknown, name, values, "without NaN")
     n_seeds = len(values)
     points = values.reshape(n_seeds, -1).T.copy()
     trim = _trim(statistic, n_seeds)
@@ -110,12 +135,11 @@ def bootstrap_interval(
         order = np.argsort(points[part], axis=1)
         ordered = np.take_along_axis(points[part], order, axis=1)
         low[part], high[part] = _limits(_trimmed_means(ordered, order, counts, trim), level)
-    unknown = np.isnan(points).any(axis=1)
-    low[unknown] = high[unknown] = np.nan
-    estimate = np.where(unknown, np.nan, statistic(points, axis=1))
+    estimate = _averaged(name, points, statistic, axis=1, anything=anything)
+    low[np.isnan(estimate)] = high[np.isnan(estimate)] = np.nan
     if values.ndim == 1:
-        return Interval(float(estimate[0]), float(low[0]), float(high[0]))
-    return Interval(estimate, low, high)
+        return _interval(float(estimate[0]), float(low[0]), float(high[0]))
+    return _interval(estimate, low, high)
 
 
 def paired_difference_interval(
@@ -133,7 +157,8 @@ def paired_difference_interval(
     ----------
     a, b : array, shape (seeds,) or (seeds, points)
         Two arms with the same seeds in the same order. Infinite where a seed never gets there: so
-        is its difference, and 0 where it does in neither arm. Of these only a median can be taken.
+        is its difference, and 0 where it does in neither arm. Of these only a median can be taken;
+        where any number would be one, between minus and plus infinity, it is 0: no difference.
     statistic, rng, level, resamples
         As in `bootstrap_interval`.
 
@@ -150,15 +175,14 @@ def paired_difference_interval(
     >>> paired_difference_interval([np.inf, 7.0, np.inf], [4.0, 5.0, np.inf], rng=rng).estimate
     2.0
     """
-    a, b = _checked_values("a", a), _checked_values("b", b)
-    if a.shape != b.shape:
-        raise ValueError(f"a has shape {a.shape}, b has {b.shape}; allowed are equal shapes")
-    infinite = np.isinf(a).any() or np.isinf(b).any()
-    if infinite and statistic is not np.median:
-        raise ValueError("a or b is infinite for some seed; allowed is then only np.median")
-    with np.errstate(invalid="ignore"):
+    a, b = _array("a", a, 1, 2), _array("b", b, 1, 2)
+    require(a.shape == b.shape, "b", b.shape, f"of the shape of a, {a.shape}")
+    if np.isinf(a).any() or np.isinf(b).any():
+        allowed = "np.median where a or b is infinite for some seed"
+        require(statistic is np.median, "statistic", statistic, allowed)
+    with np.errstate(invalid="ignore", over="ignore"):
         differences = np.where(np.isinf(a) & (a == b), 0.0, a - b)
-    return bootstrap_interval(differences, statistic, rng=rng, level=level, resamples=resamples)
+    return _bootstrap("a - b", differences, statistic, rng, level, resamples, anything=0.0)
 
 
 def probability_of_improvement(
@@ -199,11 +223,10 @@ def probability_of_improvement(
     >>> tuple(probability_of_improvement([np.inf], [np.inf], rng=rng))
     (0.5, 0.0, 1.0)
     """
-    a, b = _checked_values("a", a), _checked_values("b", b)
-    _check_draws(rng, level, resamples)
-    for name, values in (("a", a), ("b", b)):
-        if values.ndim != 1 or np.isnan(values).any():
-            raise ValueError(f"{name} has shape {values.shape}; allowed is (seeds,) without NaN")
+    a, b = floats("a", a, (None,), finite=False), floats("b", b, (None,), finite=False)
+    require(len(a), "a", a, "not empty")
+    require(len(b), "b", b, "not empty")
+    level, resamples = _checked_draws(rng, level, resamples)
     if np.isposinf(a).all() and np.isposinf(b).all():
         return Interval(0.5, 0.0, 1.0)
     # Counted in halves, whole numbers: rounding cannot push the limits past the estimate.
@@ -211,7 +234,7 @@ def probability_of_improvement(
     drawn_a, drawn_b = (_seed_counts(len(arm), resamples, rng) for arm in (a, b))
     all_pairs = 2.0 * len(a) * len(b)
     low, high = _limits(np.sum((drawn_a @ halves) * drawn_b, axis=1) / all_pairs, level)
-    return Interval(float(halves.sum() / all_pairs), float(low), float(high))
+    return _interval(float(halves.sum() / all_pairs), float(low), float(high))
 
 
 def proportion_interval(successes: int, trials: int, *, level: float = 0.95) -> Interval:
@@ -222,8 +245,8 @@ def proportion_interval(successes: int, trials: int, *, level: float = 0.95) -> 
 
     Raises
     ------
-    ValueError
-        Not 0 <= successes <= trials, no trials, or `level` not between 0 and 1.
+    TypeError, ValueError
+        Not integers with 0 <= successes <= trials, no trials, or `level` not between 0 and 1.
 
     Examples
     --------
@@ -231,14 +254,11 @@ def proportion_interval(successes: int, trials: int, *, level: float = 0.95) -> 
     >>> f"{estimate:.2f} [{low:.2f}, {high:.2f}]"
     '0.90 [0.74, 0.97]'
     """
-    _check_level(level)
-    if not 0 <= successes <= trials or trials == 0:
-        raise ValueError(
-            f"successes is {successes}, trials {trials}; allowed are 0 <= successes <= trials, "
-            "1 <= trials"
-        )
+    level = number("level", level, above=0, below=1)
+    trials = integer("trials", trials, 1)
+    successes = integer("successes", successes, 0, trials)
     limits = stats.binomtest(successes, trials).proportion_ci(level, method="wilson")
-    return Interval(successes / trials, float(limits.low), float(limits.high))
+    return _interval(successes / trials, float(limits.low), float(limits.high))
 
 
 def learning_curves(
@@ -256,6 +276,7 @@ def learning_curves(
     ----------
     table : pandas.DataFrame
         With the columns `seed`, `episode` (from 1) and `column`; one row a seed and episode.
+        Infinities are averaged like other numbers; NaN is refused.
     column : str
         What is drawn.
     seeds : sequence of int
@@ -275,9 +296,9 @@ def learning_curves(
 
     Raises
     ------
-    ValueError
-        The table has several rows for a seed and episode (several arms), no such column, or other
-        seeds or episodes than those asked for.
+    TypeError, ValueError
+        The table has several rows for a seed and episode (several arms), no such column, other
+        seeds or episodes than those asked for, or a window that averages infinities of both signs.
 
     Examples
     --------
@@ -287,25 +308,33 @@ def learning_curves(
            [80., nan],
            [nan, nan]])
     """
-    if column not in table:
-        raise ValueError(f"column is {column!r}; allowed are {list(table.columns)}")
-    if window < 1 or average not in ("median", "mean"):
-        raise ValueError(
-            f"window is {window}, average {average!r}; allowed are from 1, and 'median' or 'mean'"
-        )
-    if table.duplicated(["seed", "episode"]).any():
-        raise ValueError("table has several rows for a seed and episode; allowed is a single arm")
+    seeds, episodes = distinct_seeds(seeds), integer("episodes", episodes, 1)
+    window = integer("window", window, 1)
+    one_of("average", average, ("median", "mean"))
+    instance("table", table, pd.DataFrame, "a pandas.DataFrame")
+    missing = {"seed", "episode", column} - set(table.columns)
+    require(not missing, "table", list(table.columns), f"with the columns {sorted(missing)} too")
+    floats(column, table[column], (None,), finite=False)
+    twice = table.duplicated(["seed", "episode"]).any()
+    require(not twice, "table", "several rows for a seed and episode", "of a single arm")
     wide = table.pivot(index="episode", columns="seed", values=column)
     others = sorted(set(wide.columns) - set(seeds))
-    if others or not wide.index.isin(range(1, episodes + 1)).all():
-        raise ValueError(
-            f"table has seeds {others} besides those asked for, and the episodes "
-            f"{wide.index.min()} to {wide.index.max()}; allowed are episodes 1 to {episodes}"
-        )
+    require(not others, "seeds", seeds, f"all that the table has, {others} too")
+    fits = wide.index.isin(range(1, episodes + 1)).all()
+    longest = f"{wide.index.min()} to {wide.index.max()}"
+    require(fits, "episodes", episodes, f"1 to the last of the table, which has {longest}")
     wide = wide.astype(np.float64).reindex(index=range(1, episodes + 1), columns=list(seeds))
     trailing = wide.rolling(window, min_periods=1)
     smooth = trailing.median() if average == "median" else trailing.mean()
-    return smooth.where(wide.notna()).to_numpy().T.copy()
+    curves = smooth.where(wide.notna()).to_numpy().T.copy()
+    # pandas leaves infinities out: windows that have one are averaged here.
+    infinite = wide.isin([np.inf, -np.inf]).astype(float)
+    windows = infinite.rolling(window, min_periods=1).max() > 0
+    statistic = np.median if average == "median" else np.mean
+    for t, i in np.argwhere((windows & wide.notna()).to_numpy()):
+        seen = wide.iloc[max(0, t + 1 - window) : t + 1, i].dropna().to_numpy()
+        curves[i, t] = _averaged(column, seen, statistic, axis=0)
+    return curves
 
 
 def learned(curves: ArrayLike, threshold: float, *, window: int) -> NDArray[np.bool_]:
@@ -323,12 +352,13 @@ def learned(curves: ArrayLike, threshold: float, *, window: int) -> NDArray[np.b
     Returns
     -------
     numpy.ndarray, shape (seeds,), bool
-        False where the window has a NaN: a seed that stopped has not learned.
+        False where the window has a NaN: a seed that stopped has not learned. False too where
+        its median lies between minus and plus infinity, and is no number.
 
     Raises
     ------
-    ValueError
-        `curves` has another shape, or `window` does not fit into it.
+    TypeError, ValueError
+        `curves` has another shape, `window` does not fit into it, or `threshold` is NaN.
 
     Examples
     --------
@@ -336,8 +366,11 @@ def learned(curves: ArrayLike, threshold: float, *, window: int) -> NDArray[np.b
     >>> learned(curves, 100, window=2)
     array([ True, False, False])
     """
-    curves = _checked_curves(curves, "window", window)
-    return np.asarray(np.median(curves[:, -window:], axis=1) <= threshold)
+    curves = _array("curves", curves, 2)
+    window = integer("window", window, 1, curves.shape[1])
+    threshold = floats("threshold", [threshold], (1,), finite=False)[0]
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.median(curves[:, -window:], axis=1) <= threshold)
 
 
 def episodes_to_threshold(
@@ -361,15 +394,17 @@ def episodes_to_threshold(
 
     Raises
     ------
-    ValueError
-        `curves` has another shape, or `hold` does not fit into it.
+    TypeError, ValueError
+        `curves` has another shape, `hold` does not fit into it, or `threshold` is NaN.
 
     Examples
     --------
     >>> episodes_to_threshold([[9.0, 3.0, 9.0, 2.0, 1.0], [9.0, 9.0, 9.0, 9.0, 3.0]], 3, hold=2)
     array([ 4., inf])
     """
-    curves = _checked_curves(curves, "hold", hold)
+    curves = _array("curves", curves, 2)
+    hold = integer("hold", hold, 1, curves.shape[1])
+    threshold = floats("threshold", [threshold], (1,), finite=False)[0]
     windows = np.lib.stride_tricks.sliding_window_view(curves <= threshold, hold, axis=1)
     below = np.all(windows, axis=2)
     return np.where(below.any(axis=1), below.argmax(axis=1) + 1.0, np.inf)
@@ -413,7 +448,7 @@ def _trim(statistic: Statistic, n: int) -> int:
         return n // 4
     if statistic is np.median:
         return (n - 1) // 2
-    raise ValueError(f"statistic is {statistic!r}; allowed are np.median, np.mean and iqm")
+    raise ValueError(f"statistic must be np.median, np.mean or iqm, got {statistic!r}")
 
 
 def _seed_counts(n_seeds: int, resamples: int, rng: np.random.Generator) -> NDArray[np.int64]:
@@ -424,39 +459,61 @@ def _seed_counts(n_seeds: int, resamples: int, rng: np.random.Generator) -> NDAr
 def _limits(drawn: NDArray[np.float64], level: float) -> tuple[Any, Any]:
     """Return the percentile limits over the last axis, as values that occur.
 
-    No interpolation, because between two infinities there is no number.
+    No interpolation, because between two infinities there is no number. A draw that is none, since
+    it averages both, counts as the one for the lower limit and as the other for the upper.
     """
-    low = np.quantile(drawn, (1 - level) / 2, axis=-1, method="lower")
-    high = np.quantile(drawn, (1 + level) / 2, axis=-1, method="higher")
+    nothing = np.isnan(drawn)
+    lowest, highest = np.where(nothing, -np.inf, drawn), np.where(nothing, np.inf, drawn)
+    low = np.quantile(lowest, (1 - level) / 2, axis=-1, method="lower")
+    high = np.quantile(highest, (1 + level) / 2, axis=-1, method="higher")
     return low, high
 
 
-def _checked_values(name: str, values: ArrayLike) -> NDArray[np.float64]:
-    values = np.asarray(values, dtype=np.float64)
-    if values.ndim not in (1, 2) or values.size == 0:
-        raise ValueError(
-            f"{name} has shape {values.shape}; allowed are (seeds,) and (seeds, points), not empty"
-        )
-    return values
+def _interval(estimate: Any, low: Any, high: Any) -> Interval:
+    """Limits that hold their estimate; sums in another order can miss it by a rounding error."""
+    if isinstance(estimate, float):
+        return Interval(estimate, min(low, estimate), max(high, estimate))
+    return Interval(estimate, np.minimum(low, estimate), np.maximum(high, estimate))
 
 
-def _checked_curves(curves: ArrayLike, name: str, length: int) -> NDArray[np.float64]:
-    curves = np.asarray(curves, dtype=np.float64)
-    if curves.ndim != 2:
-        raise ValueError(f"curves has shape {curves.shape}; allowed is (seeds, episodes)")
-    if not 1 <= length <= curves.shape[1]:
-        raise ValueError(f"{name} is {length}; allowed are 1 to {curves.shape[1]} episodes")
-    return curves
+def _averaged(
+    name: str,
+    values: NDArray[np.float64],
+    statistic: Statistic,
+    *trim: float,
+    axis: int,
+    anything: float | None = None,
+) -> Any:
+    """Return a statistic of values, NaN where they have one.
+
+    Between infinities of both signs there is anything: refused, unless it is said what to take.
+    """
+    with np.errstate(invalid="ignore"):
+        middle = np.asarray(statistic(values, *trim, axis=axis))
+    unknown = np.isnan(values).any(axis=axis)
+    between = np.isnan(middle) & ~unknown
+    allowed = "without infinities of both signs in the middle"
+    require(anything is not None or not between.any(), name, values, allowed)
+    middle[between] = anything
+    return np.where(unknown, np.nan, middle)
 
 
-def _check_draws(rng: object, level: float, resamples: int) -> None:
-    if not isinstance(rng, np.random.Generator):
-        raise TypeError(f"rng is {rng!r}; allowed is a numpy.random.Generator")
-    _check_level(level)
-    if resamples < 1:
-        raise ValueError(f"resamples is {resamples}; allowed are integers from 1")
+def _array(name: str, values: ArrayLike, *dimensions: int) -> NDArray[np.float64]:
+    """Return numbers as float64, not empty; NaN stands for what is missing."""
+    try:
+        given = np.asarray(values)
+    except ValueError:  # ragged nesting
+        given = np.empty((0, 0, 0))
+    shape = (None,) * (given.ndim if given.ndim in dimensions else dimensions[-1])
+    missing = pd.isna(given) if given.dtype.kind in "fO" else np.zeros(given.shape, bool)
+    if missing.any() or given.dtype.kind == "b":
+        given = np.where(missing, 0.0, given)
+    array = floats(name, given, shape, finite=False)
+    require(array.size, name, array, "not empty")
+    array[missing] = np.nan
+    return array
 
 
-def _check_level(level: float) -> None:
-    if not 0 < level < 1:
-        raise ValueError(f"level is {level}; allowed are numbers between 0 and 1")
+def _checked_draws(rng: object, level: float, resamples: int) -> tuple[float, int]:
+    generator("rng", rng)
+    return number("level", level, above=0, below=1), integer("resamples", resamples, 1)

@@ -6,6 +6,7 @@ installed already; `CHROMIUM` names another one.
 
 import os
 import threading
+import time
 from collections.abc import Iterator
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
@@ -153,11 +154,41 @@ def test_pictures_are_there_and_described(visit):
           if (image.naturalWidth === 0) broken.push(`not shown: ${image.src}`);
           if (!image.alt.trim() || /^[_.]*\\/?_images\\//.test(image.alt))
             broken.push(`not described: ${image.src}`);
+          if (!image.getAttribute('width') || !image.getAttribute('height'))
+            broken.push(`moves the page when it comes: ${image.src.slice(0, 80)}`);
         }
         return broken;
         """
     )
     assert broken == []
+
+
+def test_nothing_holds_up_the_page(visit):
+    """But a script of few bytes; mathematics is loaded where there are formulas, and only there."""
+    blocking, mathjax, formulas = visit.page.evaluate(
+        """() => [
+          [...document.head.querySelectorAll('script[src]')].filter(it => !it.defer && !it.async)
+            .map(it => performance.getEntriesByName(it.src)[0]?.decodedBodySize ?? 0),
+          document.querySelectorAll('script[src*=mathjax]').length,
+          document.querySelectorAll('article .math').length,
+        ]"""
+    )
+    assert sum(blocking) < 2_000
+    assert bool(mathjax) == bool(formulas)
+
+
+def test_icons_are_drawn(visit):
+    """Each has a width, which a character that the font lacks has too, so the font is asked."""
+    lost = visit.page.evaluate(
+        """async () => {
+          await document.fonts.load('900 16px "Font Awesome 6 Free"', '\\uf0c9');
+          return [...document.querySelectorAll('i[class*=fa-]')]
+            .filter(it => !/["'][^"']["']/.test(getComputedStyle(it, '::before').content))
+            .map(it => it.className);
+        }"""
+    )
+    assert lost == []
+    assert visit.page.evaluate("document.fonts.check('900 16px \"Font Awesome 6 Free\"')")
 
 
 def test_films_play_and_are_described(visit):
@@ -226,6 +257,70 @@ def test_links_within_the_book_lead_somewhere(visit):
         sorted(targets),
     )
     assert lost == []
+
+
+def test_headings_of_tables_are_not_empty(visit):
+    empty = visit.find(
+        "return [...article.querySelectorAll('th')].filter(it => !it.textContent.trim()).length"
+    )
+    assert empty == 0
+
+
+def test_the_focus_can_be_seen(desk):
+    """Tabulator by tabulator, with nothing drawn outside of a box that clips it."""
+    desk.go("book/02_q_learning.html")
+    unseen = []
+    for _ in range(60):
+        desk.page.keyboard.press("Tab")
+        unseen += desk.page.evaluate(
+            """() => {
+              const it = document.activeElement, style = getComputedStyle(it);
+              const drawn = style.outlineStyle !== 'none' || style.boxShadow !== 'none';
+              if (it.matches('video')) return [];  // its own controls show where they are
+              const clipped = it.matches('.output, .cell_output, mjx-container')
+                && parseFloat(style.outlineOffset) >= 0;
+              return drawn && !clipped ? [] : [it.outerHTML.slice(0, 80)];
+            }"""
+        )
+    assert unseen == []
+
+
+def targets(page: Page) -> list[str]:
+    """For each chapter, the first and the last place that the front page leads to."""
+    links = page.evaluate(
+        "() => [...document.querySelectorAll('article a[href*=\"#\"]')].map(it => it.href)"
+    )
+    pages: dict[str, list[str]] = {}
+    for link in dict.fromkeys(links):
+        address = urldefrag(link)
+        if address.url != urldefrag(page.url).url:
+            pages.setdefault(address.url, []).append(link)
+    return [link for those in pages.values() for link in {those[0]: 0, those[-1]: 0}]
+
+
+@pytest.mark.parametrize("name", ["desk light", "phone light"])
+def test_a_link_from_the_front_page_lands_on_its_figure(browser, address, name):
+    """Also if pictures are slow: what comes above the target must not push it away."""
+    with browser.new_context(**VIEWS[name]) as context:
+        page = context.new_page()
+        visit = Visit(page, address).go("book/intro.html")
+        links = targets(page)
+        assert len(links) > 6
+        page.route("**/*.png", lambda route: (time.sleep(0.05), route.continue_()))
+        missed = {}
+        for link in links:
+            visit.go(link.removeprefix(f"{address}/"))
+            page.wait_for_timeout(300)
+            top, end = page.evaluate(
+                """id => [
+                  document.getElementById(id).getBoundingClientRect().top,
+                  innerHeight + scrollY >= document.documentElement.scrollHeight - 2,
+                ]""",
+                urldefrag(link).fragment,
+            )
+            if not (0 <= top <= 120 or (end and 0 <= top < 900)):
+                missed[link] = top
+    assert missed == {}
 
 
 def test_a_preview_says_so_on_every_page(visit):
@@ -326,6 +421,18 @@ def test_the_caption_speaks_of_headings_where_there_are_some(view):
     view.go("book/intro.html")
     shown = [view.page.locator(f"table.claims {it}").is_visible() for it in ("thead", ".sorts")]
     assert shown == [view.page.viewport_size["width"] > 700] * 2
+
+
+def test_a_claim_takes_one_line_on_a_desk_and_three_on_a_phone(view):
+    """Except where the verdict depends on the reading, and both numbers are shown."""
+    view.go("book/intro.html")
+    wide = view.page.viewport_size["width"] > 700
+    rows = view.page.locator("table.claims tbody tr:not(:has(.readings))")
+    heights = rows.evaluate_all("rows => rows.map(row => row.getBoundingClientRect().height)")
+    assert max(heights) < (30 if wide else 70)
+    first = rows.first.locator("details")
+    first.locator("summary").press("Enter")
+    assert first.get_by_text("Decides: ").is_visible()
 
 
 DARK = "() => matchMedia('(prefers-color-scheme: dark)').matches"

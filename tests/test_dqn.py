@@ -403,7 +403,7 @@ def test_through_the_store_with_workers_and_resumed_the_bits_are_the_same(tmp_pa
     arms = [Arm(name, dqn, name, config, 3) for name, config in CONFIGS.items()]
     arguments = {"seeds": range(4), "block": 2, "progress": False}
     one = run_arms(arms, store=tmp_path / "one", workers=1, **arguments)
-    run_arms(arms[:1], store=tmp_path / "two", workers=2, seeds=[1, 3], block=1, progress=False)
+    run_arms(arms[:1], store=tmp_path / "two", workers=2, seeds=[1, 3], progress=False)
     two = run_arms(arms, store=tmp_path / "two", workers=2, **arguments)
     pd.testing.assert_frame_equal(one.table, two.table, check_exact=True)
     for arm in arms:

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rl_core import shaping
 from rl_core.evaluation import evaluate, uniform
+from rl_core.worlds import shaping
 from studies import evaluation as study
 
 

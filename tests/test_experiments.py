@@ -2,6 +2,7 @@
 
 import dataclasses
 import getpass
+import importlib
 import os
 import random
 import select
@@ -9,23 +10,27 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
+import gymnasium
+import numba
 import numpy as np
 import pandas as pd
 import pytest
 import torch
 import toy_experiment
 import toy_learner
-from toy_learner import ToyConfig, count_threads, learn
+from toy_learner import ToyConfig, count_threads, extra_column, learn
 
 import rl_core
 from rl_core.dqn import DQNConfig, dqn
 from rl_core.experiments import Arm, DamagedResultWarning, provenance, run, runner
 from rl_core.experiments.store import ARRAYS, RECORD, TABLE, Store
-from rl_core.grid_learning import GridConfig, q_learning_on_grid
-from rl_core.policies import Gaussian
+from rl_core.policies import MLP, Gaussian
+from rl_core.q_learning import QLearningConfig, q_learning
 from rl_core.reinforce import ReinforceConfig, reinforce
+from rl_core.worlds.names import Make
 
 TESTS = Path(__file__).parent
 PLAIN = Arm("plain", learn, "CartPole-v1", ToyConfig(), 20, (0, 20))
@@ -39,7 +44,7 @@ CAR = Arm(
     "MountainCarContinuous-v0",
     ReinforceConfig(
         policy=Gaussian(learn_sigma=True, constant_feature=True),
-        biases=False,
+        network=MLP(biases=False),
         epochs=1,
         normalise="centre",
         max_episode_steps=700,
@@ -263,6 +268,120 @@ def test_what_takes_longest_goes_first(tmp_path, seeds_run):
     new = Arm("new", learn, "CartPole-v1", ToyConfig(step_size=0.3), 1)
     run([short, long, new], seeds=[0, 1], store=tmp_path, workers=1, **quiet)
     assert seeds_run == [("new", 0), ("new", 1), ("long", 1), ("short", 1)]
+
+
+# --- a result is served only for what made it -----------------------------------------------------
+
+
+WORLD = """
+from dataclasses import dataclass
+from gymnasium.envs.classic_control import CartPoleEnv
+
+class Cart(CartPoleEnv):
+    def __init__(self, length=0.5):
+        super().__init__()
+        self.length = length
+
+@dataclass(frozen=True)
+class Rule:
+    epsilon: float = 0.1
+"""
+
+
+@dataclasses.dataclass(frozen=True)
+class Ruled(ToyConfig):
+    """A config with a part from another module."""
+
+    rule: object = None
+
+
+@pytest.fixture
+def world(tmp_path, monkeypatch):
+    """A module with an environment and a part of a config."""
+    path = tmp_path / "served_world.py"
+    path.write_text(WORLD)
+    monkeypatch.syspath_prepend(tmp_path)
+    gymnasium.register("Served-v0", entry_point="served_world:Cart")
+    yield importlib.import_module("served_world")
+    gymnasium.registry.pop("Served-v0", None)
+    del sys.modules["served_world"]
+
+
+def test_another_registration_under_the_same_id_runs_again(tmp_path, seeds_run, world):
+    arm = dataclasses.replace(PLAIN, env="Served-v0")
+    run([arm], seeds=[0], store=tmp_path / "store", workers=1, **quiet)
+    gymnasium.registry.pop("Served-v0")
+    gymnasium.register("Served-v0", entry_point="served_world:Cart", kwargs={"length": 0.6})
+    run([arm], seeds=[0], store=tmp_path / "store", workers=1, **quiet)
+    assert len(seeds_run) == 2
+    run([arm], seeds=[0], store=tmp_path / "store", workers=1, **quiet)
+    assert len(seeds_run) == 2
+
+
+def test_the_code_of_a_part_of_the_config_counts(world):
+    arm = dataclasses.replace(PLAIN, config=Ruled(rule=world.Rule()))
+    before = arm.identity()
+    path = Path(world.__file__)
+    path.write_text(WORLD.replace("class Rule:", "class Rule:\n    greedy = True"))
+    assert arm.identity() != before
+
+
+def test_the_switches_of_numba_count(monkeypatch):
+    before = PLAIN.identity()
+    monkeypatch.setattr(numba.config, "OPT", 0)
+    assert PLAIN.identity() != before
+
+
+def test_code_that_nothing_depends_on_does_not_count(world):
+    before = PLAIN.identity()
+    Path(world.__file__).write_text(WORLD + "\nA = 1\n")
+    assert PLAIN.identity() == before
+    machinery = {"runner", "store", "progress", "workers"}
+    assert not {f"rl_core.experiments.{name}" for name in machinery} & set(before["code"])
+
+
+def test_an_environment_that_workers_cannot_find_is_refused(tmp_path):
+    class Local(gymnasium.Env):
+        pass
+
+    gymnasium.register("Local-v0", entry_point=Local)
+    try:
+        with pytest.raises(TypeError, match=r"^arm 'plain': env 'Local-v0' must be registered"):
+            run([dataclasses.replace(PLAIN, env="Local-v0")], seeds=[0], store=tmp_path / "store")
+    finally:
+        del gymnasium.registry["Local-v0"]
+    assert not (tmp_path / "store").exists()
+
+
+def test_an_environment_with_arguments_is_named_with_them(tmp_path):
+    arm = dataclasses.replace(PLAIN, env=Make("CartPole-v1", {"sutton_barto_reward": True}))
+    made = run([arm, BOLD], seeds=[0], store=tmp_path, workers=1, **quiet).provenance
+    assert made.env.tolist() == ["CartPole-v1(sutton_barto_reward=True)", "CartPole-v1"]
+
+
+# --- labels ---------------------------------------------------------------------------------------
+
+
+def test_labels_become_columns_and_make_no_other_result(tmp_path, seeds_run):
+    arms = [
+        dataclasses.replace(PLAIN, name=f"rate {rate}", labels={"rate": rate, "biases": True})
+        for rate in (0.1, 0.2)
+    ]
+    results = run([PLAIN], seeds=[0], store=tmp_path, workers=1, **quiet)
+    labelled = run(arms, seeds=[0], store=tmp_path, workers=1, **quiet)
+    assert len(seeds_run) == 1
+    assert list(labelled.table)[:4] == ["arm", "rate", "biases", "seed"]
+    assert labelled.table.groupby("arm").rate.unique().explode().tolist() == [0.1, 0.2]
+    columns = list(results.table)[1:]
+    assert labelled.table.loc[:19, columns].equals(results.table[columns])
+
+
+def test_a_label_that_is_a_column_of_the_table_is_refused(tmp_path):
+    arm = dataclasses.replace(ACROBOT, labels={"loss": 1})
+    run([arm], seeds=[0], store=tmp_path, workers=1, **quiet)
+    arm = Arm("extra", extra_column, "CartPole-v1", ToyConfig(), 1, labels={"extra": 1})
+    with pytest.raises(ValueError, match="labels of arm 'extra' must be no columns of its table"):
+        run([arm], seeds=[0], store=tmp_path, workers=1, **quiet)
 
 
 # --- what is told besides -------------------------------------------------------------------------
@@ -497,7 +616,7 @@ def test_run_refuses(tmp_path, change, error, message):
             "env must have a Discrete action space",
         ),
         (
-            {"algorithm": q_learning_on_grid, "config": GridConfig(bins=(5, 5))},
+            {"algorithm": q_learning, "config": QLearningConfig(bins=(5, 5))},
             r"bins must be a positive integer, or 6 of them, got \(5, 5\)",
         ),
     ],
@@ -512,17 +631,16 @@ def test_an_arm_that_cannot_run_stops_all_before_anything_runs(tmp_path, change,
 # --- several processes, and kills -----------------------------------------------------------------
 
 
-def start(*command, **options):
+def start(*command, **environment):
     """Start a program in a process group of its own."""
     path = os.pathsep.join([str(TESTS), str(Path(rl_core.__file__).parents[1])])
     return subprocess.Popen(
         [sys.executable, "-W", "error", *map(str, command)],
-        env={**os.environ, "PYTHONPATH": path},
+        env={**os.environ, "PYTHONPATH": path, **{k: str(v) for k, v in environment.items()}},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
-        **options,
     )
 
 
@@ -634,3 +752,86 @@ def test_code_that_is_no_longer_on_disk_is_not_run(tmp_path, workers, outcome):
     store = str(tmp_path / "store")
     script.write_text(STALE.format(folder=str(tmp_path), store=store, workers=workers))
     assert outcome in " ".join(finish(start(script)))
+
+
+# --- where it lies, and what it leaves ------------------------------------------------------------
+
+
+def test_the_default_number_of_workers_is_that_of_the_cores_we_may_use(tmp_path, monkeypatch):
+    asked = []
+    original = runner._joblib
+    monkeypatch.setattr(runner.joblib, "cpu_count", lambda: 3)
+    monkeypatch.setattr(runner, "_joblib", lambda *them: asked.append(them) or original(*them))
+    run([PLAIN], seeds=[0], store=tmp_path, backend="threading", **quiet)
+    assert asked == [("threading", 3)]
+
+
+def test_a_store_that_cannot_be_written_is_told_before_work_begins(tmp_path, seeds_run):
+    (tmp_path / "file").touch()
+    for store, reason in ((tmp_path / "file" / "x", "Not a dir"), (tmp_path / ("x" * 300), "too")):
+        with pytest.raises(ValueError, match=f"store must be a folder that can be .*{reason}"):
+            run([PLAIN], seeds=[0], store=store, workers=1, **quiet)
+    assert seeds_run == []
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="paths in bytes")
+def test_paths_may_be_long_and_of_any_letters(tmp_path, uninterrupted):
+    """A checkout below /home/jürgen, in a terminal that knows ASCII only."""
+    folder = tmp_path / "jürgens wörk" / ("x" * 200) / ("y" * 200)
+    store, temporary = folder / "störe", folder / "temporary"
+    temporary.mkdir(parents=True)
+    for name in ("toy_experiment.py", "toy_learner.py"):
+        (folder / name).write_text((TESTS / name).read_text())
+    process = start(folder / "toy_experiment.py", "toy", store, 2, LC_ALL="C", TMPDIR=temporary)
+    assert finish(process) == ["begun", uninterrupted["toy"]]
+
+
+def test_what_the_dead_left_is_removed_though_there_is_no_work(tmp_path, seeds_run):
+    run([PLAIN], seeds=[0], store=tmp_path, workers=1, **quiet)
+    (tmp_path / "scratch" / "of the dead").mkdir()
+    run([PLAIN], seeds=[0], store=tmp_path, workers=1, **quiet)
+    assert len(seeds_run) == 1
+    assert list((tmp_path / "scratch").iterdir()) == []
+
+
+def test_joblibs_temporary_folder_is_ours_and_goes(tmp_path, monkeypatch):
+    monkeypatch.setattr(runner, "_temporary", lambda: tmp_path / "temporary")
+    (tmp_path / "temporary" / f"{runner.TEMPORARY}dead").mkdir(parents=True)
+    (tmp_path / "temporary" / "of others").mkdir()
+    run([PLAIN], seeds=range(3), store=tmp_path / "store", workers=2, **quiet)
+    assert [path.name for path in (tmp_path / "temporary").iterdir()] == ["of others"]
+
+
+def children(pid):
+    """The processes that a process has started, by Linux's /proc."""
+    return [
+        int(child)
+        for task in Path(f"/proc/{pid}/task").iterdir()
+        for child in (task / "children").read_text().split()
+    ]
+
+
+def is_alive(pid):
+    """Whether a process runs; one that nobody has waited for does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="knows children by Linux's /proc")
+def test_workers_end_with_their_parent(tmp_path):
+    program = TESTS / "toy_experiment.py"
+    with start(program, "slow", tmp_path, 2) as process:
+        assert process.stdout.readline() == "begun\n"
+        while not list(tmp_path.glob("results/*")):
+            time.sleep(0.05)
+        workers = children(process.pid)
+        assert len(workers) >= 2
+        process.kill()  # it alone, not its group
+    for _ in range(600):
+        if not any(map(is_alive, workers)):
+            break
+        time.sleep(0.05)
+    assert not any(map(is_alive, workers))
+    assert len(list(tmp_path.glob("results/*"))) < len(toy_experiment.SEEDS)

@@ -1,4 +1,4 @@
-"""Exploration rules give the probabilities they promise; schedules stay between their ends."""
+"""What rules and schedules take, refuse and promise."""
 
 import dataclasses
 import json
@@ -6,84 +6,40 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from odd_values import ODD, PLAIN, try_out
 
 from rl_core.exploration import (
     EpsilonGreedy,
-    Evaluation,
     Geometric,
+    HalfWay,
     Linear,
     Softmax,
+    Trials,
     UnnormalisedSoftmax,
     VisitDecay,
-    choose,
-    step_size,
+    check_epsilon,
+    schedule_state,
     values,
 )
 from rl_core.identity import describe
 
-UNIT = st.floats(0, 1, exclude_max=True)
-ACTION_VALUES = st.lists(st.floats(-100, 100), min_size=1, max_size=6).map(np.array)
+
+def by_episodes(start=0.5, end=0.1, episodes=3):
+    return Linear(start, end, episodes=episodes)
 
 
-def shares(rule, q, n=400):
-    """How often each action is taken over an even grid of the two uniforms."""
-    grid = (np.arange(n) + 0.5) / n
-    vs = grid if isinstance(rule, EpsilonGreedy) else [0.5]
-    parameter = float(values(rule.parameter, 1)[0])
-    taken = [choose(rule.kind, parameter, np.array(q), u, v) for u in grid for v in vs]
-    return np.bincount(taken, minlength=len(q)) / len(taken)
+def by_steps(start=0.5, end=0.1, steps=3):
+    return Linear(start, end, steps=steps)
 
 
-@pytest.mark.parametrize(
-    ("epsilon", "q", "expected"),
-    [
-        (0.0, [0.0, 1.0, 0.0, 0.0], [0, 1, 0, 0]),
-        (0.2, [0.0, 1.0, 0.0, 0.0], [0.05, 0.85, 0.05, 0.05]),
-        (1.0, [0.0, 1.0, 0.0, 0.0], [0.25, 0.25, 0.25, 0.25]),
-        (0.0, [2.0, 1.0, 2.0, 2.0], [1 / 3, 0, 1 / 3, 1 / 3]),
-        (0.4, [-1.0, -1.0, -3.0, -2.0], [0.4, 0.4, 0.1, 0.1]),
-        (0.9, [0.0, 0.0, 0.0, 0.0], [0.25, 0.25, 0.25, 0.25]),
-    ],
-)
-def test_epsilon_is_the_probability_of_a_random_action_and_ties_are_shared(epsilon, q, expected):
-    assert shares(EpsilonGreedy(epsilon), q) == pytest.approx(expected, abs=0.004)
+def geometric(start=0.5, end=0.1, episodes=3):
+    return Geometric(start, end, episodes)
 
 
-@pytest.mark.parametrize("temperature", [0.01, 0.1, 1.0, 50.0])
-@pytest.mark.parametrize("q", [[0.0, 0.1, 0.3], [1000.0, 1000.1, 999.0], [-5.0, -5.0, -5.2]])
-def test_softmax_weighs_actions_by_the_exponential_of_their_values(temperature, q):
-    weights = [math.exp((x - max(q)) / temperature) for x in q]
-    expected = np.array(weights) / sum(weights)
-    assert shares(Softmax(temperature), q, n=20_000) == pytest.approx(expected, abs=1e-4)
-
-
-@pytest.mark.parametrize("rule", [EpsilonGreedy(0.3), Softmax(0.7), Softmax(1e-6)])
-@given(q=ACTION_VALUES, u=UNIT, v=UNIT)
-def test_any_two_uniforms_pick_an_action(rule, q, u, v):
-    assert 0 <= choose(rule.kind, rule.parameter, q, u, v) < len(q)
-
-
-@given(q=ACTION_VALUES, v=UNIT)
-def test_the_greedy_action_has_the_largest_value(q, v):
-    assert q[choose(EpsilonGreedy.kind, 0.0, q, 0.0, v)] == q.max()
-
-
-@given(q=st.lists(st.floats(0, 5), min_size=4, max_size=4).map(np.array), u=UNIT)
-def test_the_unnormalised_softmax_divides_by_the_sum_of_the_values(q, u):
-    if q.sum() == 0:
-        expected = 0
-    else:
-        with np.errstate(over="ignore"):
-            cumulative = np.cumsum(np.exp(q) / q.sum())
-        if np.any(np.abs(cumulative - u) < 1e-9):  # a rounding error decides
-            return
-        expected = int(np.argmax(cumulative > u))
-    assert choose(UnnormalisedSoftmax.kind, 1.0, q, u, 0.0) == expected
-
-
-@pytest.mark.parametrize("schedule", [Linear, Geometric])
+@pytest.mark.parametrize("schedule", [by_episodes, geometric])
+@settings(deadline=None)
 @given(start=st.floats(1e-3, 1), end=st.floats(1e-3, 1), length=st.integers(1, 50))
 def test_schedules_go_from_start_to_end_and_stay(schedule, start, end, length):
     course = schedule(start, end, length).values(length + 5)
@@ -95,49 +51,128 @@ def test_schedules_go_from_start_to_end_and_stay(schedule, start, end, length):
 
 
 def test_linear_steps_are_equal_and_geometric_factors_are():
-    linear, geometric = Linear(0.2, 1.0, 4).values(5), Geometric(0.1, 0.8, 3).values(4)
+    linear, shrinking = by_episodes(0.2, 1.0, 4).values(5), geometric(0.1, 0.8, 3).values(4)
     assert linear == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
-    assert geometric == pytest.approx([0.1, 0.2, 0.4, 0.8])
+    assert shrinking == pytest.approx([0.1, 0.2, 0.4, 0.8])
 
 
-def test_a_step_size_decays_with_visits():
-    assert [step_size(0.5, 1.0, n) for n in (1, 2, 10)] == pytest.approx([0.5, 0.25, 0.05])
-    assert step_size(0.5, 0.5, 4) == pytest.approx(0.25)
-    assert step_size(0.3, 0.0, 1000) == 0.3
+# Schedules in the wrong unit
+
+
+def test_a_schedule_is_by_the_episode_or_by_the_step():
+    for arguments in ({}, {"episodes": 3, "steps": 3}):
+        with pytest.raises(ValueError, match=r"^episodes, steps must be one of them a number"):
+            Linear(1, 0, **arguments)
+
+
+@pytest.mark.parametrize(
+    ("make", "name"),
+    [
+        (EpsilonGreedy, "epsilon"),
+        (Softmax, "temperature"),
+        (VisitDecay, "initial"),
+    ],
+)
+def test_tables_refuse_a_schedule_by_the_step(make, name):
+    make(by_episodes())
+    with pytest.raises(ValueError, match=rf"^{name} must be a schedule by the episode, got Linear"):
+        make(by_steps())
+    with pytest.raises(TypeError, match=rf"^{name} must be .*, got HalfWay"):
+        make(HalfWay())
+
+
+def test_networks_refuse_a_schedule_by_the_episode():
+    assert check_epsilon("epsilon", by_steps()) == by_steps()
+    with pytest.raises(ValueError, match=r"^epsilon must be a schedule by the environment step"):
+        check_epsilon("epsilon", by_episodes())
+    with pytest.raises(TypeError, match=r"^epsilon must be .*, got Geometric"):
+        check_epsilon("epsilon", geometric())
+    with pytest.raises(ValueError, match=r"^epsilon.start must be a number from 0 to 1, got 1.5"):
+        check_epsilon("epsilon", by_steps(start=1.5))
+
+
+def test_a_schedule_by_the_step_has_no_values_by_the_episode():
+    with pytest.raises(TypeError, match="episodes must be an integer where values are asked for"):
+        by_steps().values(5)
+
+
+def test_a_schedule_s_state_begins_at_its_start():
+    for epsilon in (0.25, by_steps(0.25), HalfWay(0.25, 0.1)):
+        assert schedule_state(epsilon)[0] == 0.25
+
+
+# Wrong values
 
 
 @pytest.mark.parametrize(
     ("make", "error", "message"),
     [
-        (lambda: EpsilonGreedy(1.1), ValueError, r"epsilon is 1.1; allowed .* \[0, 1\]"),
-        (lambda: EpsilonGreedy(-0.1), ValueError, "epsilon is -0.1"),
-        (lambda: EpsilonGreedy(math.nan), ValueError, "epsilon is nan"),
-        (lambda: EpsilonGreedy("0.1"), TypeError, "epsilon is '0.1'"),
-        (lambda: EpsilonGreedy(True), TypeError, "epsilon is True"),
-        (lambda: EpsilonGreedy(Linear(0.5, 1.5, 9)), ValueError, "epsilon.end is 1.5"),
-        (lambda: Softmax(0), ValueError, "temperature is 0; allowed are finite numbers above 0"),
-        (lambda: Softmax(-1.0), ValueError, "temperature is -1.0"),
-        (lambda: Softmax(math.inf), ValueError, "temperature is inf"),
-        (lambda: Softmax(Linear(1.0, 0.0, 9)), ValueError, "temperature.end is 0.0"),
-        (lambda: Geometric(0.5, 0.0, 9), ValueError, "end is 0.0; allowed are numbers above 0"),
-        (lambda: Linear(0.5, math.nan, 9), ValueError, "end is nan"),
-        (lambda: Linear(0.5, 0.1, 0), ValueError, "episodes is 0; allowed are integers from 1"),
-        (lambda: Linear(0.5, 0.1, 2.5), TypeError, "episodes is 2.5"),
-        (lambda: VisitDecay(initial=0), ValueError, "initial is 0; allowed"),
-        (lambda: VisitDecay(exponent=1.5), ValueError, "exponent is 1.5"),
-        (lambda: VisitDecay(exponent=Linear(0.6, 1, 9)), TypeError, "exponent is Linear"),
-        (lambda: Evaluation(every=0), ValueError, "every is 0"),
-        (lambda: Evaluation(episodes=1.5), TypeError, "episodes is 1.5"),
-        (lambda: Evaluation(epsilon=2), ValueError, "epsilon is 2"),
+        (lambda: EpsilonGreedy(1.1), ValueError, "epsilon must be a number from 0 to 1, got 1.1"),
+        (lambda: EpsilonGreedy(-0.1), ValueError, "epsilon must .*, got -0.1"),
+        (lambda: EpsilonGreedy(math.nan), ValueError, "epsilon must .*, got nan"),
+        (lambda: EpsilonGreedy("0.1"), TypeError, "epsilon must .*, got '0.1'"),
+        (lambda: EpsilonGreedy(True), TypeError, "epsilon must .*, got True"),
+        (lambda: EpsilonGreedy(by_episodes(0.5, 1.5)), ValueError, "epsilon.end must .*, got 1.5"),
+        (lambda: Softmax(0), ValueError, "temperature must be a finite number above 0, got 0"),
+        (lambda: Softmax(-1.0), ValueError, "temperature must .*, got -1.0"),
+        (lambda: Softmax(math.inf), ValueError, "temperature must .*, got inf"),
+        (lambda: Softmax(by_episodes(1.0, 0.0)), ValueError, "temperature.end must .*, got 0.0"),
+        (lambda: geometric(0.5, 0.0), ValueError, "end must be a finite number above 0, got 0.0"),
+        (lambda: by_episodes(0.5, math.nan), ValueError, "end must .*, got nan"),
+        (lambda: by_episodes(episodes=0), ValueError, "episodes must be an integer from 1.*got 0"),
+        (lambda: by_episodes(episodes=2.5), TypeError, "episodes must .*, got 2.5"),
+        (lambda: by_steps(steps=0), ValueError, "steps must be an integer from 1 or None, got 0"),
+        (lambda: HalfWay(1.1), ValueError, "start must be a number from 0 to 1, got 1.1"),
+        (lambda: HalfWay(0.9, -0.1), ValueError, "end must be a number from 0 to 1, got -0.1"),
+        (lambda: VisitDecay(initial=0), ValueError, "initial must .*, got 0"),
+        (lambda: VisitDecay(exponent=0), ValueError, "exponent must be .* above 0 .*, got 0"),
+        (lambda: VisitDecay(exponent=1.5), ValueError, "exponent must be .* to 1.*, got 1.5"),
+        (lambda: VisitDecay(exponent=by_episodes()), TypeError, "exponent must .*, got Linear"),
+        (lambda: Trials(every=0), ValueError, "every must be an integer from 1, got 0"),
+        (lambda: Trials(episodes=1.5), TypeError, "episodes must .*, got 1.5"),
+        (lambda: Trials(max_steps=0), ValueError, "max_steps must .*, got 0"),
+        (lambda: Trials(epsilon=2), ValueError, "epsilon must .*, got 2"),
     ],
 )
 def test_wrong_values_are_refused(make, error, message):
-    with pytest.raises(error, match=message):
+    with pytest.raises(error, match=f"^{message}"):
         make()
 
 
+def test_edges_that_are_allowed():
+    assert VisitDecay(1, 1) == VisitDecay(1.0, 1.0)
+    assert EpsilonGreedy(0).epsilon == 0.0
+    assert EpsilonGreedy(1).epsilon == 1.0
+    assert Softmax(5e-324).temperature > 0
+    assert Trials(every=1, episodes=1, max_steps=1, epsilon=1).epsilon == 1.0
+
+
 @pytest.mark.parametrize(
-    "rule", [EpsilonGreedy(Linear(0.9, 0.1, 100)), Softmax(0.3), UnnormalisedSoftmax()]
+    "make",
+    [by_episodes, by_steps, geometric, HalfWay, VisitDecay, EpsilonGreedy, Softmax, Trials],
+    ids=lambda make: make.__name__,
+)
+@settings(max_examples=60, deadline=None)
+@given(st.data())
+def test_values_of_any_type_become_plain_or_are_refused_by_name(make, data):
+    names = make.__code__.co_varnames if make.__name__.islower() else make.__annotations__
+    name = data.draw(st.sampled_from([name for name in names if name != "kind"]))
+    made = try_out(make, name, data.draw(ODD))
+    if made is not None:
+        assert all(type(value) in PLAIN for value in vars(made).values())
+        json.dumps(dataclasses.asdict(made))
+
+
+@given(ODD)
+@settings(max_examples=60, deadline=None)
+def test_values_are_a_number_an_episode_whatever_number_was_given(epsilon):
+    rule = try_out(EpsilonGreedy, "epsilon", epsilon)
+    if rule is not None:
+        assert values(rule.parameter, 3).tolist() == [rule.epsilon] * 3
+
+
+@pytest.mark.parametrize(
+    "rule", [EpsilonGreedy(by_episodes(0.9)), Softmax(0.3), UnnormalisedSoftmax()]
 )
 def test_rules_can_be_written_as_json_and_told_apart(rule):
     json.dumps(dataclasses.asdict(rule))

@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from rl_core import dynamics
+from rl_core.worlds.twins import TASKS
 from studies.fastest import fastest
 
 STARTS = np.linspace(-0.6, -0.4, 21)
@@ -23,10 +23,10 @@ def test_finer_grids_agree_better(name):
 
 
 def _steps(name, start, forces):
-    state = np.array([start, 0.0, 0.0, 0.0])
-    code = dynamics.TASKS[name].code
+    kernel = TASKS[name].kernel()
+    kernel.state[0] = start
     for t, force in enumerate(forces, 1):
-        if dynamics.step(code, state, np.array([force], np.float32))[1]:
+        if kernel.step(kernel.state, np.array([force], np.float32))[1]:
             return t
     return np.inf
 
@@ -50,10 +50,28 @@ def test_close_to_the_goal_a_plan_can_be_counted():
     assert fastest(name, np.array([start]), points=400).driven[0] <= pushing
 
 
-def test_bad_arguments():
-    with pytest.raises(ValueError, match="env must be one of"):
-        fastest("Acrobot-v1", STARTS, points=50)
-    with pytest.raises(ValueError, match="points must be"):
-        fastest("MountainCar-v0", STARTS, points=1)
-    with pytest.raises(ValueError, match="positions must be"):
-        fastest("MountainCar-v0", np.array([-2.0]), points=50)
+@pytest.mark.parametrize(
+    ("argument", "value", "error"),
+    [
+        ("env", "Acrobot-v1", ValueError),
+        ("env", 3, TypeError),
+        ("points", 1, ValueError),
+        ("points", 30_001, ValueError),
+        ("points", 50.0, TypeError),
+        ("positions", np.array([-2.0]), ValueError),
+        ("positions", np.array([np.nan]), ValueError),
+        ("positions", np.zeros((1, 2)), ValueError),
+        ("positions", "here", TypeError),
+    ],
+)
+def test_bad_arguments_are_refused_by_name(argument, value, error):
+    usual = {"env": "MountainCar-v0", "positions": STARTS, "points": 50}
+    with pytest.raises(error, match=rf"^{argument} must be"):
+        fastest(**{**usual, argument: value})
+
+
+def test_a_number_of_points_may_be_of_any_width():
+    """200 x 200 points are more than fit into eight bits."""
+    start = np.array([-0.5])
+    small = fastest("MountainCar-v0", start, points=np.uint8(200))
+    assert small.driven == fastest("MountainCar-v0", start, points=200).driven

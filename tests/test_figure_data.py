@@ -17,7 +17,7 @@ def test_every_point_of_every_curve_is_a_row():
 
 
 def test_curves_of_another_shape_are_refused():
-    with pytest.raises(ValueError, match=r"arms\['one'\] has the shape \(3, 2\)"):
+    with pytest.raises(ValueError, match=r"arms\['one'\] must be .*\(2, 3\), got \(3, 2\)"):
         figure_data.tidy(np.arange(3), {"one": np.zeros((3, 2))}, value="y", seeds=range(2))
 
 
@@ -26,3 +26,10 @@ def test_what_is_offered_can_be_read_again(tmp_path):
     figure_data.offer("figure_0", table, folder=tmp_path / "figures")
     again = pd.read_csv(tmp_path / "figures" / "figure_0.csv")
     pd.testing.assert_frame_equal(again, table, rtol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["../figure_0", "figures/figure_0", "figure 0", ""])
+def test_a_name_is_never_a_path(tmp_path, name):
+    with pytest.raises(ValueError, match="name must be a name of letters"):
+        figure_data.offer(name, pd.DataFrame(), folder=tmp_path / "figures")
+    assert list(tmp_path.iterdir()) == []

@@ -351,6 +351,45 @@ def test_arguments_of_the_wrong_type() -> None:
     assert Maze(slip=Fraction(1, 10)).model().probability[0, 0].tolist() == [0.9, 0.1]
 
 
+ODD = [
+    None, True, "0.9", "", b"x", [], [[1.0], []], {}, object(), 1j, -1, 2.5, 1e308, 5e-324, 2**70,
+    float("nan"), float("inf"), Fraction(1, 3), np.float32(0.25), np.uint8(200), np.int64(-3),
+    np.array(3), np.zeros(2), np.array(["a", "b"]), np.array([0.0, np.nan]), [None, 1], iter("SG"),
+    int, 2**31, range(3),
+]  # fmt: skip
+MADE = Maze()
+CALLS = {
+    Maze: {"layout": "SG", "slip": 0.1, "render_mode": None},
+    random_maze: {
+        "rows": 3, "columns": 3, "flags": 1, "wall_fraction": 0.1,
+        "rng": np.random.default_rng(0), "slip": 0.1,
+    },
+    MADE.state: {"row": 0, "column": 0, "flags": ""},
+    MADE.locate: {"state": 0},
+    MDP: {
+        "successor": [[[0]]], "probability": [[[1.0]]], "reward": [[[1.0]]], "terminal": [False],
+        "start_state": [0], "start_probability": [1.0],
+    },
+    MADE.model().following: {"policy": np.zeros(112, int)},
+    MDP.from_env: {"env": "rl_core/Maze-v0", "start_distribution": None},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("function", "right", "name"),
+    [(function, right, name) for function, right in CALLS.items() for name in right],
+    ids=lambda value: getattr(value, "__qualname__", value if isinstance(value, str) else ""),
+)
+def test_odd_arguments_are_named_or_do(function: Any, right: dict[str, Any], name: str) -> None:
+    for odd in ODD:
+        message = name
+        try:
+            function(**{**right, name: odd})
+        except (TypeError, ValueError) as error:
+            message = str(error)
+        assert name in message, odd
+
+
 def test_too_many_states() -> None:
     row = "O" * 200
     layout = ["S" + row[1:], *[row] * 198, "F" * 16 + row[17:] + "G"]

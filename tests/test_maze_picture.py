@@ -67,3 +67,12 @@ def test_sixteen_flags_fit_on_the_agent() -> None:
     flags = dict.fromkeys("ABCDEFGHIJKLMNOP", (1, 2))
     picture = draw_maze(WALLS, (0, 0), [(0, 2)], flags, "ABCDEFGHIJKLMNOP", (1, 1))
     assert pixels_of(picture, 1, 1, YELLOW) > 16 * 5
+
+
+def test_what_means_different_things_has_different_colours() -> None:
+    picture = draw(held="A", agent=(0, 0))  # on the start: the frame is seen around the agent
+    assert pixels_of(picture, 0, 0, SKY_BLUE) > 500
+    assert pixels_of(picture, 0, 0, BLUE) > 1000
+    palette = np.array([BLUE, SKY_BLUE, GREEN, VERMILLION, YELLOW, FLOOR, WALL], dtype=float)
+    distance = np.linalg.norm(palette[:, None] - palette, axis=2)
+    assert distance[~np.eye(len(palette), dtype=bool)].min() > 70

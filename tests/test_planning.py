@@ -1,6 +1,7 @@
 """Planning: against answers by hand, linear programs, direct solves and a plain-Python loop."""
 
 import tracemalloc
+from fractions import Fraction
 
 import gymnasium as gym
 import numpy as np
@@ -10,7 +11,8 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 
 from rl_core import planning
-from rl_core.kernels import sweeps
+from rl_core.kernels import bounds, sweeps
+from rl_core.kernels.bounds import error_bound
 from rl_core.maze import Maze, random_maze
 from rl_core.mdp import MDP
 from rl_core.planning import (
@@ -503,8 +505,194 @@ def test_the_tolerance_an_error_names_can_be_had():
     assert np.abs(V - exact_values(mdp, 0.999)).max() < attainable + 1e-9
 
 
+def ring(*rewards):
+    """A state a reward, round and round: nothing but the discount makes values finite."""
+    n_states = len(rewards)
+    following = (np.arange(n_states) + 1) % n_states
+    return model(
+        following[:, None, None], np.ones((n_states, 1, 1)), np.reshape(rewards, (-1, 1, 1))
+    )
+
+
+# Bounds that are attained: the errors are as large as the planners say they may be.
+
+PAID_FOR_STAYING = model([[[0]]], np.ones((1, 1, 1)), np.ones((1, 1, 1)))
+
+
+@pytest.mark.parametrize("gamma", [0.5, 0.9, 0.999])
+def test_the_bound_of_q_value_iteration_is_attained(gamma):
+    exact = 1 / (1 - gamma)
+    for n_sweeps in (1, 2, 7, 40):
+        plan = q_value_iteration(PAID_FOR_STAYING, gamma=gamma, max_sweeps=n_sweeps)
+        error, bound = exact - plan.V[0], plan.table["bound"].iloc[-1]
+        assert bound == pytest.approx(error, rel=1e-5, abs=1e-12 / (1 - gamma))
+
+
+@pytest.mark.parametrize("gamma", [0.5, 0.9, 0.999])
+def test_the_bound_of_value_iteration_is_attained(gamma):
+    # So large a tolerance allows V = 0; one sweep follows.
+    plan = value_iteration(PAID_FOR_STAYING, gamma=gamma, tolerance=1.0001 / (1 - gamma))
+    assert plan.V.tolist() == [1.0]
+    assert plan.table["bound"].tolist() == [pytest.approx(1 / (1 - gamma) - 1, rel=1e-5)]
+    again = value_iteration(PAID_FOR_STAYING, gamma=gamma, tolerance=0.9 * gamma / (1 - gamma))
+    assert again.V[0] == pytest.approx(1 / (1 - gamma))
+
+
+def test_the_bound_of_a_sweep_in_place_is_attained():
+    # States are swept before their successors, but for the last, whose error is small enough to
+    # change no more than the others: so the first goes on with all of its successor's error.
+    gamma, n_states = 0.5, 60
+    mdp = ring(*np.ones(n_states))
+    _, transitions, reward = planning._opened(mdp, gamma)
+    errors = np.ones(n_states)
+    errors[-1] = 1 - gamma + gamma**2
+    for s in range(n_states - 2, 0, -1):
+        errors[s] = 1 - gamma + gamma * errors[s + 1]
+    V, policy = 1 / (1 - gamma) - errors, np.zeros(n_states, np.int8)
+    chosen = transitions.successor[:, 0].copy()
+    residual, *_ = sweeps.improvement_sweep(
+        transitions, reward[:, :, 0], gamma, V, policy, chosen, False
+    )
+    largest = np.abs(V - 1 / (1 - gamma)).max()
+    assert error_bound(residual, gamma, rounding=0.0) == pytest.approx(largest, rel=1e-8)
+
+
+# Discounts close to 1
+
+
+@pytest.mark.parametrize(
+    ("planner", "options", "name"),
+    [
+        (q_value_iteration, {"threshold": 1e-5}, "threshold 1e-05"),
+        (value_iteration, {"tolerance": 1e-6}, "tolerance 1e-06"),
+        (policy_iteration, {"evaluation_threshold": 1e-6}, "evaluation_threshold 1e-06"),
+    ],
+)
+def test_what_would_take_too_many_sweeps_is_refused(monkeypatch, planner, options, name):
+    monkeypatch.setattr(bounds, "TRIED", 2000)
+    with pytest.raises(ArithmeticError, match=f"{name} .*gamma 0.9999999.*ask for .* or more"):
+        planner(ring(1.0, 2.0), gamma=1 - 1e-7, progress=False, **options)
+    # Where episodes end, values are found all the same.
+    maze = Maze().model()
+    if planner is not policy_iteration:
+        assert planner(maze, gamma=1 - 1e-7, **options).V[0] == pytest.approx(3, abs=1e-4)
+
+
+def test_equations_are_solved_for_a_discount_close_to_1():
+    gamma = 1 - 1e-8
+    plan = policy_iteration(ring(1.0, 2.0), gamma=gamma)
+    assert plan.V[0] == pytest.approx((1 + 2 * gamma) / (1 - gamma**2), rel=1e-7)
+
+
+def test_a_coarse_evaluation_never_changes_an_optimal_policy():
+    rng = np.random.default_rng(11)
+    for _ in range(20):
+        mdp = random_model(rng, 20)
+        policy = value_iteration(mdp, gamma=0.99, tolerance=1e-9).policy
+        table = policy_iteration(
+            mdp, gamma=0.99, evaluation_threshold=5.0, initial_policy=policy
+        ).table
+        assert table["policy_changes"].tolist() == [0]
+        assert table["bound"].iloc[-1] > 10  # coarse
+
+
+def test_large_models_are_evaluated_as_exactly_as_float64_allows(monkeypatch):
+    monkeypatch.setattr(planning, "DIRECT_LIMIT", 0)
+    gamma = 1 - 1e-7
+    mdp = model([[[1]], [[1]]], np.ones((2, 1, 1)), [[[0.0]], [[1.0]]])
+    V = policy_evaluation(mdp, [0, 0], gamma=gamma)
+    assert pytest.approx([gamma / (1 - gamma), 1 / (1 - gamma)], rel=1e-7) == V
+
+
+@pytest.mark.parametrize("threshold", [None, 1e-3])
+def test_to_name_the_default_initial_policy_saves_its_backups_only(threshold):
+    mdp = random_model(np.random.default_rng(2), 30)
+    immediate = greedy_policy(backup(mdp, np.zeros(30), gamma=0.9))
+    default, named = (
+        policy_iteration(mdp, gamma=0.9, evaluation_threshold=threshold, initial_policy=initial)
+        for initial in (None, immediate)
+    )
+    assert len(default.table) > 1
+    assert (default.table["backups"] - named.table["backups"]).tolist() == [90] * len(named.table)
+    assert default.table.drop(columns="backups").equals(named.table.drop(columns="backups"))
+    assert default.Q.tobytes() == named.Q.tobytes()
+
+
 @pytest.mark.parametrize("planner", [q_value_iteration, value_iteration, policy_iteration])
-@pytest.mark.parametrize("gamma", [1, 1.0, -0.1, 1.5, float("nan"), float("inf")])
+def test_returns_too_large_for_float64_are_refused(planner):
+    with pytest.raises(ValueError, match="mdp must be of returns up to"):
+        planner(ring(1e308), gamma=0.9)
+
+
+@pytest.mark.parametrize(
+    "gamma", [Fraction(9, 10), np.float64(0.9), np.float32(0.5), 0, np.int8(0)], ids=repr
+)
+def test_numbers_of_every_kind_are_numbers(gamma):
+    mdp = Maze().model()
+    exact = float(gamma)
+    assert (
+        value_iteration(mdp, gamma=gamma).Q.tolist() == value_iteration(mdp, gamma=exact).Q.tolist()
+    )
+    assert (
+        q_value_iteration(
+            mdp, gamma=gamma, threshold=Fraction(1, 1000), max_sweeps=np.uint8(200)
+        ).V.tolist()
+        == q_value_iteration(mdp, gamma=exact, threshold=0.001, max_sweeps=200).V.tolist()
+    )
+    assert greedy_policy([[Fraction(1, 3), Fraction(1, 2)]]).tolist() == [1]
+
+
+ODD = st.sampled_from(
+    [
+        None, True, np.True_, "0.9", "", b"x", [], [[1.0], []], {}, object(), 1j, 0, -1, 0.5, 2.5,
+        1 - 1e-15, 1 - 1e-9, 1, 1e308, -1e308, 5e-324, 2**70, float("nan"), float("inf"),
+        -float("inf"), Fraction(1, 3), np.float32(0.25), np.uint8(200), np.int64(-3),
+        np.zeros(2), np.zeros((2, 2)), np.array(["a", "b"]), np.array([0.0, np.nan]),
+        np.array([np.inf, 0.0]), np.array([0, 1]), np.array([True, False]), [0, 5], [None, 1],
+    ]
+)  # fmt: skip
+CALLS = {
+    "q_value_iteration": (
+        q_value_iteration,
+        {"mdp", "gamma", "threshold", "max_sweeps", "progress"},
+    ),
+    "value_iteration": (value_iteration, {"mdp", "gamma", "tolerance", "progress"}),
+    "policy_iteration": (
+        policy_iteration,
+        {"mdp", "gamma", "evaluation_threshold", "initial_policy", "progress"},
+    ),
+    "policy_evaluation": (policy_evaluation, {"mdp", "gamma", "policy"}),
+    "backup": (backup, {"mdp", "gamma", "V"}),
+    "greedy_policy": (greedy_policy, {"Q"}),
+    "optimal_actions": (optimal_actions, {"Q", "tolerance"}),
+}
+
+
+def complaint(function, arguments):
+    """Return what the function says; nothing to say is right for any argument."""
+    try:
+        function(**arguments)
+    except (TypeError, ValueError, ArithmeticError) as error:
+        return str(error)
+    return " ".join(arguments)
+
+
+@settings(max_examples=400, deadline=None)
+@given(name=st.sampled_from(sorted(CALLS)), data=st.data())
+def test_odd_arguments_are_named_or_do(name, data):
+    function, names = CALLS[name]
+    given_right = {
+        "mdp": ring(1.0, 2.0), "gamma": 0.5, "policy": [0, 0], "V": [0.0, 1.0], "Q": [[0.0, 1.0]],
+        "progress": False,
+    }  # fmt: skip
+    arguments = {key: value for key, value in given_right.items() if key in names}
+    odd = data.draw(st.sampled_from(sorted(names)))
+    arguments[odd] = data.draw(ODD)
+    assert odd in complaint(function, arguments)
+
+
+@pytest.mark.parametrize("planner", [q_value_iteration, value_iteration, policy_iteration])
+@pytest.mark.parametrize("gamma", [1, 1.0, -0.1, 1.5, float("nan"), float("inf"), 1 - 1e-9])
 def test_gamma_out_of_range(planner, gamma):
     with pytest.raises(ValueError, match="gamma must be a number from 0"):
         planner(Maze().model(), gamma=gamma)

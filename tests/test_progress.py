@@ -109,7 +109,8 @@ def test_a_notebook_shows_it_in_place_and_keeps_none_of_it(tmp_path, monkeypatch
             return super().process_message(message, *arguments)
 
     Client(notebook, kernel_name="python3", timeout=60).execute()
-    assert any(re.match(r"a: 1 of 2:  50% of 2 seeds, .* left", d["text/plain"]) for d in shown)
+    lines = [data["text/plain"] for data in shown]
+    assert any(re.match(r"a: 1 of 2:  50% of 2 seeds, .* left", line) for line in lines), lines
     displays = [o for o in cell.outputs if o.output_type == "display_data"]
     assert [dict(output.data) for output in displays] == [{"text/html": "", "text/plain": ""}]
     streams = [(o.name, o.text) for o in cell.outputs if o.output_type == "stream"]

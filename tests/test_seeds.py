@@ -61,5 +61,5 @@ def test_a_sentence_stands_on_its_premise():
     premise("false, but a first look", False, preview=True)
     with pytest.raises(AssertionError, match="do not bear out: false"):
         premise("false", False, preview=False)
-    with pytest.raises(TypeError, match="sentence is False; allowed is a str"):
+    with pytest.raises(TypeError, match="sentence must be a str, got False"):
         premise(False, "a sentence", preview=False)

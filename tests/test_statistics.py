@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from fractions import Fraction
 
 import numpy as np
 import pandas as pd
@@ -49,6 +50,8 @@ def test_iqm_works_along_an_axis_and_lets_nan_through():
     assert result.shape == (4,)
     assert np.isnan(result).tolist() == [False, False, True, False]
     np.testing.assert_allclose(iqm(values.T, axis=1), result)
+    np.testing.assert_allclose(iqm(values), result)  # over the seeds, which are the rows
+    assert result[0] == pytest.approx(np.sort(values[:, 0])[2:7].mean())
 
 
 # --- bootstrap ------------------------------------------------------------------------------------
@@ -92,8 +95,9 @@ def test_every_draw_is_the_statistic_of_the_drawn_seeds(statistic):
     interval = bootstrap_interval(values, statistic, rng=generator(9), resamples=1)
     counts = generator(9).multinomial(7, np.full(7, 1 / 7), size=1)[0]
     drawn = statistic(np.repeat(values, counts, axis=0), axis=0)
-    np.testing.assert_allclose(interval.low, drawn, rtol=1e-12)
-    np.testing.assert_array_equal(interval.low, interval.high)
+    # With one draw it is one limit and the estimate, which the interval holds, the other.
+    np.testing.assert_allclose(interval.low, np.minimum(drawn, interval.estimate), rtol=1e-12)
+    np.testing.assert_allclose(interval.high, np.maximum(drawn, interval.estimate), rtol=1e-12)
 
 
 def test_the_same_seeds_are_drawn_at_every_point():
@@ -182,26 +186,101 @@ def test_a_nan_is_not_left_out_silently(statistic):
     interval = bootstrap_interval(curves, statistic, rng=generator(), resamples=50)
     for part in interval:
         assert np.isnan(part).tolist() == [False, True, False]
-    assert np.isnan(bootstrap_interval(curves[:, 1], statistic, rng=generator(), resamples=5)).all()
+    with pytest.raises(ValueError, match="values must be without NaN"):
+        bootstrap_interval(curves[:, 1], statistic, rng=generator(), resamples=5)
 
 
 @pytest.mark.parametrize(
     ("change", "error", "message"),
     [
-        ({"values": []}, ValueError, r"values has shape \(0,\)"),
-        ({"values": np.zeros((2, 2, 2))}, ValueError, r"values has shape \(2, 2, 2\)"),
-        ({"statistic": np.max}, ValueError, "statistic is .*max.*allowed are np.median"),
-        ({"level": 1.0}, ValueError, "level is 1.0; allowed"),
-        ({"level": 95}, ValueError, "level is 95; allowed"),
-        ({"resamples": 0}, ValueError, "resamples is 0; allowed"),
-        ({"rng": 7}, TypeError, "rng is 7; allowed"),
-        ({"rng": np.random}, TypeError, "rng is .*; allowed"),
+        ({"values": []}, ValueError, "values must be not empty"),
+        ({"values": np.zeros((2, 2, 2))}, ValueError, r"values must be .*, got \(2, 2, 2\)"),
+        ({"values": [[1.0], [1.0, 2.0]]}, ValueError, "values must be an array of numbers"),
+        ({"values": 5.0}, ValueError, r"values must be .*, got \(\)"),
+        ({"values": ["1", "2"]}, TypeError, "values must be an array of numbers"),
+        ({"values": [1j, 2]}, TypeError, "values must be an array of numbers"),
+        ({"values": [np.inf, -np.inf], "statistic": np.mean}, ValueError, "both signs"),
+        ({"statistic": np.max}, ValueError, "statistic must be np.median.*got .*max"),
+        ({"level": 1.0}, ValueError, "level must be .*, got 1.0"),
+        ({"level": 95}, ValueError, "level must be .*, got 95"),
+        ({"resamples": 0}, ValueError, "resamples must be .*, got 0"),
+        ({"resamples": 10.0}, TypeError, "resamples must be .*, got 10.0"),
+        ({"rng": 7}, TypeError, "rng must be .*, got 7"),
+        ({"rng": np.random}, TypeError, "rng must be .*, got "),
     ],
 )
 def test_bootstrap_refuses(change, error, message):
     arguments = {"values": [1.0, 2.0], "statistic": np.median, "rng": generator()} | change
     with pytest.raises(error, match=message):
         bootstrap_interval(**arguments)
+
+
+extremes = st.one_of(numbers, st.sampled_from([np.inf, -np.inf, 0.1, 1 / 3, 1e-300]))
+
+
+@quick
+@given(
+    hnp.arrays(np.float64, st.integers(1, 12), elements=extremes),
+    st.sampled_from(STATISTICS),
+    st.sampled_from([1, 2, 200]),
+)
+def test_interval_holds_its_estimate_exactly(values, statistic, resamples):
+    """Whatever the data are, infinities of both signs included, or it is refused by name."""
+    arguments = {"statistic": statistic, "rng": generator(), "resamples": resamples}
+    with np.errstate(invalid="ignore"):
+        defined = not np.isnan(statistic(values) if statistic is not iqm else _middle(values))
+    if defined:
+        found = bootstrap_interval(values, **arguments)
+        assert found.low <= found.estimate <= found.high
+    else:
+        with pytest.raises(ValueError, match="values must be without infinities of both signs"):
+            bootstrap_interval(values, **arguments)
+
+
+def _middle(values):
+    cut = len(values) // 4
+    return np.mean(np.sort(values)[cut : len(values) - cut])
+
+
+@pytest.mark.parametrize("statistic", STATISTICS)
+@pytest.mark.parametrize("value", [0.1, 1 / 3, 1e300, -7.3, np.inf, -np.inf])
+@pytest.mark.parametrize("seeds", [1, 2, 3, 7, 30])
+def test_of_equal_values_the_estimate_is_that_value(statistic, value, seeds):
+    estimate, low, high = bootstrap_interval([value] * seeds, statistic, rng=generator())
+    assert low <= estimate <= high
+    for limit in (low, estimate, high):
+        assert limit == pytest.approx(value, rel=1e-15)
+
+
+def test_a_draw_between_both_infinities_reaches_as_far_as_either():
+    """The median of -inf, 1, 2, inf is 1.5; of many draws the middle is an infinity, or none."""
+    found = bootstrap_interval([-np.inf, 1.0, 2.0, np.inf], rng=generator())
+    assert found == (1.5, -np.inf, np.inf)
+
+
+@pytest.mark.parametrize(
+    "kind", ["int8", "uint8", "int64", "float16", "float32", "longdouble", "object", "bool"]
+)
+def test_numbers_of_any_type_are_the_same_numbers(kind):
+    plain = [1.0, 0.0, 1.0, 1.0, 0.0]
+    given = np.array([Fraction(x) for x in plain] if kind == "object" else plain, kind)
+    for statistic in STATISTICS:
+        assert bootstrap_interval(given, statistic, rng=generator()) == bootstrap_interval(
+            plain, statistic, rng=generator()
+        )
+        assert iqm(given) == iqm(plain)
+    numbers_of_kind = (np.asarray(plain, kind).tolist(), pd.Series(plain).astype(kind))
+    for arm in (given, *numbers_of_kind):
+        found = paired_difference_interval(arm, [0, 1, 0, 0, 0], np.mean, rng=generator())
+        assert found.estimate == pytest.approx(0.4)
+    assert learned([given], np.float32(1), window=np.uint8(5)).tolist() == [True]
+    assert episodes_to_threshold([given], Fraction(0), hold=1).tolist() == [2]
+
+
+def test_fractions_take_integers_of_any_width():
+    assert proportion_interval(np.uint8(27), np.int8(30)) == proportion_interval(27, 30)
+    with pytest.raises(TypeError, match="successes must be an integer"):
+        proportion_interval(True, 30)
 
 
 # --- comparing arms -------------------------------------------------------------------------------
@@ -216,9 +295,9 @@ def test_pairing_removes_what_the_seeds_share():
 
 
 def test_differences_refuse_what_cannot_be_subtracted():
-    with pytest.raises(ValueError, match=r"a has shape \(2,\), b has \(3,\)"):
+    with pytest.raises(ValueError, match=r"b must be of the shape of a, \(2,\), got \(3,\)"):
         paired_difference_interval([1.0, 2.0], [1.0, 2.0, 3.0], rng=generator())
-    with pytest.raises(ValueError, match=r"infinite .* only np\.median"):
+    with pytest.raises(ValueError, match=r"statistic must be np\.median where a or b is infinite"):
         paired_difference_interval([1.0, np.inf], [1.0, np.inf], np.mean, rng=generator())
 
 
@@ -227,6 +306,12 @@ def test_a_seed_that_never_gets_there_has_an_infinite_difference_unless_neither_
     interval = paired_difference_interval(a, b, rng=generator())
     assert interval == bootstrap_interval([0, np.inf, -np.inf, 1, 3], rng=generator())
     assert interval == (1, -np.inf, np.inf)
+
+
+def test_half_the_seeds_better_and_half_worse_without_end_is_no_difference():
+    assert paired_difference_interval([np.inf, 1], [2, np.inf], rng=generator()) == (
+        *(0, -np.inf, np.inf),
+    )
 
 
 def test_probability_of_improvement_is_the_mann_whitney_statistic():
@@ -254,8 +339,10 @@ def test_probability_of_improvement_resamples_the_seeds_of_both_arms():
 
 def test_probability_of_improvement_takes_infinities_and_refuses_nan():
     assert probability_of_improvement([1.0, np.inf], [np.inf], rng=generator()).estimate == 0.75
-    with pytest.raises(ValueError, match="b has shape"):
+    with pytest.raises(ValueError, match="b must be without NaN"):
         probability_of_improvement([1.0], [np.nan], rng=generator())
+    with pytest.raises(ValueError, match="a must be not empty"):
+        probability_of_improvement([], [1.0], rng=generator())
 
 
 def test_arms_in_which_no_seed_gets_there_are_no_evidence_for_equality():
@@ -291,10 +378,10 @@ def test_wilson_interval_covers_as_often_as_promised_at_thirty_seeds():
 @pytest.mark.parametrize(
     ("successes", "trials", "level", "message"),
     [
-        (5, 4, 0.95, "successes is 5, trials 4; allowed"),
-        (-1, 4, 0.95, "successes is -1, trials 4; allowed"),
-        (0, 0, 0.95, "successes is 0, trials 0; allowed"),
-        (1, 2, 1.5, "level is 1.5; allowed"),
+        (5, 4, 0.95, "successes must be an integer from 0 to 4, got 5"),
+        (-1, 4, 0.95, "successes must be an integer from 0 to 4, got -1"),
+        (0, 0, 0.95, "trials must be an integer from 1, got 0"),
+        (1, 2, 1.5, "level must be .*, got 1.5"),
     ],
 )
 def test_fractions_refuse(successes, trials, level, message):
@@ -342,15 +429,60 @@ def test_curves_are_trailing_averages(steps, window, average):
         )
 
 
+def test_curves_keep_infinities():
+    table = episodes_table({0: [1, 2, np.inf, 4, 5, 6, 7], 1: [np.inf, 3, np.inf]})
+    nan, inf = np.nan, np.inf
+    shape = {"seeds": [0, 1], "episodes": 7, "window": 3}
+    np.testing.assert_array_equal(
+        learning_curves(table, **shape),
+        [[1, 1.5, 2, 4, 5, 5, 6], [inf, inf, inf, nan, nan, nan, nan]],
+    )
+    np.testing.assert_array_equal(
+        learning_curves(table, average="mean", **shape),
+        [[1, 1.5, inf, inf, inf, 5, 6], [inf, inf, inf, nan, nan, nan, nan]],
+    )
+
+
+@quick
+@given(
+    hnp.arrays(
+        np.float64,
+        st.tuples(st.integers(1, 3), st.integers(1, 9)),
+        elements=st.one_of(numbers, st.just(np.inf)),
+    ),
+    st.integers(1, 10),
+    st.sampled_from(["median", "mean"]),
+)
+def test_curves_with_infinities_are_trailing_averages(steps, window, average):
+    curves = learning_curves(
+        episodes_table(dict(enumerate(steps))),
+        **{"seeds": range(len(steps)), "episodes": steps.shape[1]},
+        **{"window": window, "average": average},
+    )
+    for t in range(steps.shape[1]):
+        part = steps[:, max(0, t + 1 - window) : t + 1]
+        np.testing.assert_allclose(
+            curves[:, t], getattr(np, average)(part, axis=1), rtol=1e-9, atol=1e-6
+        )
+
+
+def test_an_arm_without_rows_has_empty_curves():
+    nothing = learning_curves(episodes_table({0: [1]})[:0], seeds=[0, 1], episodes=2)
+    np.testing.assert_array_equal(nothing, np.full((2, 2), np.nan))
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"column": "reward"}, r"column is 'reward'; allowed are \['seed', 'episode', 'steps'\]"),
-        ({"window": 0}, "window is 0"),
-        ({"average": "max"}, "average 'max'"),
-        ({"seeds": [1]}, r"seeds \[0\] besides"),
-        ({"episodes": 2}, "episodes 1 to 3; allowed are episodes 1 to 2"),
-        ({"table": pd.concat([episodes_table({0: [1]})] * 2)}, "several rows"),
+        ({"column": "reward"}, r"table must be with the columns \['reward'\] too, got \['seed', "),
+        ({"window": 0}, "window must be an integer from 1, got 0"),
+        ({"average": "max"}, "average must be one of 'median', 'mean', got 'max'"),
+        ({"seeds": [1]}, r"seeds must be all that the table has, \[0\] too"),
+        ({"seeds": [0, 1, 1]}, "seeds must be"),
+        ({"episodes": 2}, "episodes must be 1 to the last of the table, which has 1 to 3, got 2"),
+        ({"table": pd.concat([episodes_table({0: [1]})] * 2)}, "table must be of a single arm"),
+        ({"table": episodes_table({0: [1, math.nan]})}, r"steps must be without NaN, at \(1,\)"),
+        ({"table": episodes_table({0: [math.inf, -math.inf]}), "window": 2}, "steps .*both signs"),
     ],
 )
 def test_curves_refuse(change, message):
@@ -368,6 +500,7 @@ def test_learned_looks_at_the_median_of_the_last_episodes():
     curves[4, -4:] = [np.inf, 100, 100, 100]
     assert learned(curves, 100, window=4).tolist() == [True, False, False, False, True]
     assert learned(curves[:, :6], 100, window=4).tolist() == [False, False, True, False, False]
+    assert learned([[-np.inf, np.inf]], 100, window=2).tolist() == [False]  # no number at all
 
 
 def test_episodes_to_threshold_needs_the_curve_to_hold():
@@ -398,10 +531,12 @@ def test_episodes_to_threshold_is_the_first_that_holds(curves, threshold, hold):
     ("function", "arguments"), [(learned, {"window": 5}), (episodes_to_threshold, {"hold": 0})]
 )
 def test_criteria_refuse(function, arguments):
-    with pytest.raises(ValueError, match="allowed are 1 to 4 episodes"):
+    with pytest.raises(ValueError, match=r"(window|hold) must be an integer from 1 to 4, got"):
         function(np.zeros((2, 4)), 1.0, **arguments)
-    with pytest.raises(ValueError, match=r"curves has shape \(4,\)"):
+    with pytest.raises(ValueError, match=r"curves must be .*, got \(4,\)"):
         function(np.zeros(4), 1.0, **arguments)
+    with pytest.raises(ValueError, match="threshold must be without NaN"):
+        function(np.zeros((2, 8)), math.nan, **dict.fromkeys(arguments, 1))
 
 
 @pytest.mark.parametrize("seeds", [3, 7, 29, 30])

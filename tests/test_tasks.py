@@ -98,6 +98,21 @@ def test_one_step_from_anywhere_equals_gymnasiums(name, data):
     np.testing.assert_array_equal(kernel.state[: len(place)], env.state)
 
 
+@pytest.mark.parametrize(
+    ("i", "edge"), [(0, 2.4), (2, original("CartPole-v1").theta_threshold_radians)]
+)
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_cartpole_ends_beyond_its_edges_not_on_them(i, edge, sign):
+    env, kernel = original("CartPole-v1"), TASKS["CartPole-v1"].kernel()
+    ends = []
+    for place in (edge, np.nextafter(edge, np.inf)):
+        env.reset(seed=0)
+        env.state = kernel.state[:] = sign * place * np.eye(4)[i]
+        ends.append(kernel.step(kernel.state, np.ones(1, np.float32))[1])
+        assert ends[-1] == env.step(1)[2]
+    assert ends == [False, True]
+
+
 @pytest.mark.parametrize("name", TASKS)
 def test_starts_are_those_of_gymnasium(name):
     env, kernel = original(name), TASKS[name].kernel()

@@ -25,6 +25,7 @@ ARMS = {
         )
         for size in (0.1, 0.5)
     ],
+    "slow": [Arm("slow", learn, "CartPole-v1", ToyConfig(seconds=0.1), 20)],
     "reinforce": [
         Arm(
             f"gamma {gamma}",

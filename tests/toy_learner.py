@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -70,6 +71,12 @@ def learn(
     table = pd.DataFrame(rows, columns=columns).sort_values(["seed", "episode"])
     arrays = {"weights": weights, "snapshots": kept, "env_steps": env_steps}
     return Run(table, arrays, tuple(failures))
+
+
+def extra_column(env: str, config: ToyConfig, **arguments: Any) -> Run:
+    """Learn as `learn` does, with one more column in the table."""
+    run = learn(env, config, **arguments)
+    return Run(run.table.assign(extra=0), run.arrays)
 
 
 def count_threads(

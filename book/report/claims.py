@@ -2,24 +2,46 @@
 
 A claim is one statement of the report. Its criteria say, before any data is seen, between which
 bounds a measured quantity has to lie. The verdict follows from the interval of that quantity alone:
-no one decides it after looking.
+no one decides it after looking. Where the report's words can fairly be read in several ways, each
+reading has its criteria, and a verdict that they do not share depends on the reading.
 """
 
 import math
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from numbers import Real
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
+import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
+
+from report.names import file_name
+from rl_core import checks
+from rl_core.checks import fields, floats, integer, require
 
 Answer = Literal["yes", "no", "open"]
-Verdict = Literal["holds", "holds in part", "does not hold", "cannot tell"]
+Verdict = Literal[
+    "holds", "holds in part", "does not hold", "cannot tell", "depends on the reading"
+]
 COLUMNS = (
     *("id", "section", "claim", "criterion", "estimate", "low", "high"),
     *("seeds", "verdict", "figure"),
+    *("deciding_criterion", "deciding_estimate", "deciding_low", "deciding_high"),
+    *("deciding_seeds", "deciding_bound", "distance", "readings", "amended", "chapter"),
 )
+WINDOWS = (0.15, 0.25, 0.35)  # of what a report says is "about" so much
+POWER = 2.04
+"""((1.96 + 0.84) / 1.96)^2: times as many seeds for a chance of 80% to tell as for one of 50%."""
+
+
+def _real(name: str, value: object) -> float:
+    """A number, infinities included."""
+    if isinstance(value, Real) and math.isinf(value):
+        return float(value)
+    return checks.number(name, value)
 
 
 @dataclass(frozen=True)
@@ -32,6 +54,11 @@ class Evidence:
         The quantity and its interval; a quantity that does not depend on chance has no width.
     seeds : int
         How many seeds stand behind it; 0 where nothing is random.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If one is no number or NaN, the interval does not hold its estimate, or seeds are negative.
     """
 
     estimate: float
@@ -40,13 +67,9 @@ class Evidence:
     seeds: int
 
     def __post_init__(self) -> None:
-        if not self.low <= self.estimate <= self.high:
-            raise ValueError(
-                "an interval must hold its estimate: low <= estimate <= high, "
-                f"not {self.low}, {self.estimate}, {self.high}"
-            )
-        if self.seeds < 0:
-            raise ValueError(f"seeds must not be negative, not {self.seeds}")
+        fields(self, estimate=(_real,), low=(_real,), high=(_real,), seeds=(integer,))
+        inside = self.low <= self.estimate <= self.high
+        require(inside, "estimate", self.estimate, f"from low to high, {self.low} to {self.high}")
 
     @classmethod
     def none(cls) -> "Evidence":
@@ -64,6 +87,10 @@ class Evidence:
         """Evidence in which nothing is random."""
         return cls(value, value, value, seeds=0)
 
+    def __str__(self) -> str:
+        interval = f" [{number(self.low)}, {number(self.high)}]" if self.low < self.high else ""
+        return f"{number(self.estimate)}{interval}"
+
 
 @dataclass(frozen=True)
 class Criterion:
@@ -80,8 +107,9 @@ class Criterion:
 
     Raises
     ------
-    ValueError
-        If the text has a "; ", which stands between criteria in the table of claims.
+    TypeError, ValueError
+        If there is no finite bound, nothing between the bounds, or a bound is NaN; or if the text
+        has a "; ", which stands between criteria in the table of claims.
     """
 
     text: str
@@ -90,13 +118,22 @@ class Criterion:
     above: float = -math.inf
 
     def __post_init__(self) -> None:
-        if "; " in self.text:
-            raise ValueError(
-                f"text must be without '; ', which ends a criterion, got {self.text!r}"
-            )
+        fields(self, at_least=(_real,), at_most=(_real,), above=(_real,))
+        require("; " not in self.text, "text", self.text, "without '; ', which ends a criterion")
+        require(self.bounds, "at_least, at_most or above", None, "a finite number")
+        possible = self.at_least <= self.at_most and self.above < self.at_most
+        require(possible, "at_most", self.at_most, "no less than at_least, and more than above")
+
+    @property
+    def bounds(self) -> tuple[float, ...]:
+        """The bounds that there are."""
+        return tuple(filter(math.isfinite, (self.at_least, self.above, self.at_most)))
 
     def answer(self, evidence: Evidence) -> Answer:
         """Say "yes" if the whole interval is within the bounds, "no" if all of it is outside.
+
+        An interval that ends at the bound of "above" leaves that open, from either side, unless it
+        is nothing but the bound.
 
         Examples
         --------
@@ -105,16 +142,50 @@ class Criterion:
         'yes'
         >>> criterion.answer(Evidence(90, 80, 110, seeds=30))
         'open'
+        >>> Criterion("more likely than not", above=0.5).answer(Evidence(0.48, 0.45, 0.5, seeds=30))
+        'open'
         """
         low, high = evidence.low, evidence.high
         if self.at_least <= low and high <= self.at_most and self._above(low):
             return "yes"
-        if high < self.at_least or self.at_most < low or not self._above(high):
+        not_above = high < self.above or low == high == self.above
+        if high < self.at_least or self.at_most < low or not_above:
             return "no"
         return "open"
 
     def _above(self, value: float) -> bool:
         return self.above < value or self.above == -math.inf
+
+    def margin(self, value: float) -> tuple[float, float]:
+        """Return how far a value keeps its nearest bound, negative if it does not, and that bound.
+
+        Examples
+        --------
+        >>> Criterion("75 to 125 steps", 75, 125).margin(140)
+        (-15.0, 125.0)
+        """
+        sides = [(value - bound, bound) for bound in (self.at_least, self.above)]
+        sides.append((self.at_most - value, self.at_most))
+        return min(side for side in sides if math.isfinite(side[1]))
+
+    def tightness(self, evidence: Evidence) -> float:
+        """Distance of the estimate from its nearest bound in halves of the interval's width."""
+        distance, half = abs(self.margin(evidence.estimate)[0]), _half(evidence)
+        if half == 0:
+            return math.inf if distance else 0.0
+        return 0.0 if math.isinf(half) else distance / half
+
+
+def _half(evidence: Evidence) -> float:
+    return 0.0 if evidence.low == evidence.high else (evidence.high - evidence.low) / 2
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Another fair reading of a claim's words: its name, and the criteria that test it."""
+
+    name: str
+    criteria: tuple[Criterion, ...]
 
 
 @dataclass(frozen=True)
@@ -133,6 +204,17 @@ class Claim:
         What has to be true, all of it; the first is the one whose estimate stands in the table.
     figure : str
         The figure or table to look at.
+    reading : str
+        How the criteria read the words, where there is another way.
+    readings : tuple of Reading
+        The other ways.
+    amended : str
+        What was changed with data known, and on which seeds it is judged since.
+
+    Raises
+    ------
+    ValueError
+        If there is no criterion, or there are other readings than one without a name.
     """
 
     id: str
@@ -140,13 +222,28 @@ class Claim:
     claim: str
     criteria: tuple[Criterion, ...]
     figure: str
+    reading: str = ""
+    readings: tuple[Reading, ...] = ()
+    amended: str = ""
 
-    def judge(self, *evidence: Evidence) -> "Finding":
+    def __post_init__(self) -> None:
+        require(self.criteria, "criteria", self.criteria, "one criterion or more")
+        named = not self.readings or self.reading
+        require(named, "reading", self.reading, "a name, since there are other readings")
+
+    def judge(self, *evidence: Evidence, readings: Sequence[Sequence[Evidence]] = ()) -> "Finding":
         """Hold the evidence, one piece a criterion, against the criteria.
 
         All answers yes: the claim holds. Some yes, others not: it holds in part. None yes, but some
         no: it does not hold, because all of it would have to be true. Otherwise, all being open,
-        the data cannot tell.
+        the data cannot tell. If another reading comes to something else, it depends on the reading.
+
+        Parameters
+        ----------
+        *evidence : Evidence
+            For the criteria, in their order.
+        readings : sequence of sequences of Evidence
+            The same for each of the other readings.
 
         Raises
         ------
@@ -159,34 +256,55 @@ class Claim:
         >>> claim.judge(Evidence.exact(7)).verdict
         'holds'
         """
-        if len(evidence) != len(self.criteria):
-            raise ValueError(
-                f"claim {self.id} has {len(self.criteria)} criteria, not {len(evidence)}"
-            )
+        wanted = f"{len(self.criteria)} pieces, one for each criterion of claim {self.id}"
+        require(len(evidence) == len(self.criteria), "evidence", evidence, wanted)
+        wanted = f"{len(self.readings)} sequences, one for each other reading of claim {self.id}"
+        require(len(readings) == len(self.readings), "readings", readings, wanted)
         answers = tuple(c.answer(e) for c, e in zip(self.criteria, evidence, strict=True))
-        return Finding(self, evidence, answers)
+        others = tuple(
+            replace(self, criteria=one.criteria, reading=one.name, readings=()).judge(*pieces)
+            for one, pieces in zip(self.readings, readings, strict=True)
+        )
+        return Finding(self, evidence, answers, others)
 
 
 @dataclass(frozen=True)
 class Finding:
-    """A claim with its evidence."""
+    """A claim with its evidence, an answer a criterion; and the findings of other readings."""
 
     claim: Claim
     evidence: tuple[Evidence, ...]
     answers: tuple[Answer, ...]
+    others: tuple["Finding", ...] = ()
 
     @property
     def verdict(self) -> Verdict:
         """What the answers come to."""
-        if all(answer == "yes" for answer in self.answers):
-            return "holds"
+        own: Verdict = "does not hold" if "no" in self.answers else "cannot tell"
         if "yes" in self.answers:
-            return "holds in part"
-        return "does not hold" if "no" in self.answers else "cannot tell"
+            own = "holds" if set(self.answers) == {"yes"} else "holds in part"
+        agreed = all(other.verdict == own for other in self.others)
+        return own if agreed else "depends on the reading"
+
+    @property
+    def deciding(self) -> int:
+        """The place of the criterion that made the verdict.
+
+        That is the first that failed. If none did, it is the tightest of those that are open; if
+        none is, the tightest of all: nearest to its bound in halves of its interval's width.
+        """
+        if "no" in self.answers:
+            return self.answers.index("no")
+        last = "open" if "open" in self.answers else "yes"
+        places = [place for place, answer in enumerate(self.answers) if answer == last]
+        return min(places, key=lambda i: self.claim.criteria[i].tightness(self.evidence[i]))
 
     def row(self) -> dict[str, object]:
         """Give the finding as a row of the table of claims."""
-        first = self.evidence[0]
+        first, place = self.evidence[0], self.deciding
+        criterion, evidence = self.claim.criteria[place], self.evidence[place]
+        distance, bound = criterion.margin(evidence.estimate)
+        every = (self, *self.others) if self.others else ()
         return {
             "id": self.claim.id,
             "section": self.claim.section,
@@ -198,7 +316,20 @@ class Finding:
             "seeds": first.seeds,
             "verdict": self.verdict,
             "figure": self.claim.figure,
+            "deciding_criterion": criterion.text,
+            "deciding_estimate": evidence.estimate,
+            "deciding_low": evidence.low,
+            "deciding_high": evidence.high,
+            "deciding_seeds": evidence.seeds,
+            "deciding_bound": bound,
+            "distance": distance,
+            "readings": "; ".join(one._as_read() for one in every),
+            "amended": self.claim.amended,
         }
+
+    def _as_read(self) -> str:
+        own = replace(self, others=()).verdict
+        return f"{self.claim.reading}: {own}, {self.evidence[self.deciding]}"
 
 
 def number(value: float) -> str:
@@ -209,6 +340,7 @@ def number(value: float) -> str:
     >>> [number(value) for value in (0.12345, 999.7, -1234.5, math.inf, -math.inf)]
     ['0.123', '1,000', '−1,234', '∞', '−∞']
     """
+    value += 0.0  # no negative zero
     if math.isinf(value):
         text = "∞" if value > 0 else "-∞"
     else:
@@ -217,10 +349,12 @@ def number(value: float) -> str:
 
 
 def seeds_to_tell(criterion: Criterion, evidence: Evidence) -> float:
-    """Seeds at which an interval, shrinking with their root, would hold no bound any more.
+    """Seeds at which an interval would leave its bound behind, with a chance of 80%.
 
-    Half an interval's width over n seeds is proportional to 1 / sqrt(n). If the estimate stayed
-    what it is, the bound would be left behind at n (half width / distance to the bound)^2 seeds.
+    What an interval reaches beyond its estimate over n seeds is proportional to 1 / sqrt(n). If the
+    estimate stayed what it is, the interval would just end at the bound with
+    n (reach / distance to the bound)^2 seeds; chance takes it further in half of all repetitions.
+    With 2.04 times as many seeds (a normal estimate, a 95% interval) it is 80% of them.
 
     Parameters
     ----------
@@ -238,37 +372,167 @@ def seeds_to_tell(criterion: Criterion, evidence: Evidence) -> float:
     --------
     >>> tenth = Criterion("at least a tenth", at_least=0.1)
     >>> seeds_to_tell(tenth, Evidence(0.2, 0.0, 0.4, seeds=30))
-    120
+    250
     """
-    half = (evidence.high - evidence.low) / 2
-    bounds = (criterion.at_least, criterion.at_most, criterion.above)
-    held = [bound for bound in bounds if evidence.low <= bound <= evidence.high]
-    distance = min((abs(evidence.estimate - bound) for bound in held), default=math.nan)
-    if not (math.isfinite(half) and distance > 0 and math.isfinite(distance)):
+    low, middle, high = evidence.low, evidence.estimate, evidence.high
+    held = [bound for bound in criterion.bounds if low <= bound <= high]
+    bound = min(held, key=lambda bound: abs(middle - bound), default=math.nan)
+    reach, distance = (middle - low if bound < middle else high - middle), abs(middle - bound)
+    if not (math.isfinite(reach) and distance > 0 and math.isfinite(distance)):
         return math.inf
-    return math.ceil(evidence.seeds * (half / distance) ** 2 / 10) * 10
+    return math.ceil(evidence.seeds * (reach / distance) ** 2 * POWER / 10) * 10
+
+
+def excluded(criterion: Criterion, evidence: Evidence) -> str:
+    """Say which values an open criterion's interval rules out, on the side that would bear it out.
+
+    Examples
+    --------
+    >>> excluded(Criterion("above a half", above=0.5), Evidence(0.55, 0.47, 0.63, seeds=30))
+    'above 0.63'
+    """
+    parts = []
+    if math.isfinite(criterion.at_most) and math.isfinite(evidence.low):
+        parts.append(f"below {number(evidence.low)}")
+    if criterion.bounds != (criterion.at_most,) and math.isfinite(evidence.high):
+        parts.append(f"above {number(evidence.high)}")
+    return " and ".join(parts) or "nothing"
+
+
+class Judged(NamedTuple):
+    """One criterion of one reading of a claim, with its evidence."""
+
+    id: str
+    reading: str
+    place: int
+    criterion: Criterion
+    evidence: Evidence
+    answer: Answer
+
+    @property
+    def label(self) -> str:
+        """Its name, such as "3a, criterion 1"."""
+        reading = f" ({self.reading})" if self.reading else ""
+        return f"{self.id}{reading}, criterion {self.place}"
+
+
+def judged(findings: Sequence[Finding]) -> Iterator[Judged]:
+    """Every criterion of every reading of the claims."""
+    for finding in findings:
+        for one in (finding, *finding.others):
+            parts = zip(one.claim.criteria, one.evidence, one.answers, strict=True)
+            for place, part in enumerate(parts, 1):
+                yield Judged(one.claim.id, one.claim.reading, place, *part)
 
 
 def what_it_would_take(findings: Sequence[Finding]) -> str:
-    """Say which criteria are open, and how many seeds would probably settle each.
+    """Say which criteria are open, how many seeds would settle each, and what is excluded.
 
     Examples
     --------
     >>> claim = Claim("9a", "9", "Few.", (Criterion("at most 2", at_most=2),), "Figure 9")
     >>> what_it_would_take([claim.judge(Evidence(1, 0, 3, seeds=30))])
-    '9a, criterion 1: 70'
+    '9a, criterion 1: 250 (excluded: below 0)'
     >>> what_it_would_take([claim.judge(Evidence.exact(1))])
     'none is open'
     """
     parts = []
-    for finding in findings:
-        criteria = zip(finding.claim.criteria, finding.evidence, finding.answers, strict=True)
-        for place, (criterion, evidence, answer) in enumerate(criteria, 1):
-            if answer == "open":
-                seeds = seeds_to_tell(criterion, evidence)
-                text = f"{seeds:,}" if math.isfinite(seeds) else "no number"
-                parts.append(f"{finding.claim.id}, criterion {place}: {text}")
+    for one in judged(findings):
+        if one.answer == "open":
+            seeds = seeds_to_tell(one.criterion, one.evidence)
+            text = f"{seeds:,}" if math.isfinite(seeds) else "no number"
+            parts.append(f"{one.label}: {text} (excluded: {excluded(one.criterion, one.evidence)})")
     return "; ".join(parts) or "none is open"
+
+
+def sensitivity(
+    about: float, values: ArrayLike, evidence: Evidence, *, windows: Sequence[float] = WINDOWS
+) -> pd.DataFrame:
+    """Say what becomes of a claim of "about" so much where "about" means more, or less.
+
+    Parameters
+    ----------
+    about : float
+        What the report says.
+    values : array, shape (seeds,)
+        What each seed comes to; infinite where it does not get there.
+    evidence : Evidence
+        The quantity that is judged.
+    windows : sequence of float
+        Half the widths of what counts as "about", as shares of it.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row a window: `window, low, high, share` of the seeds inside, `answer`.
+
+    Raises
+    ------
+    TypeError, ValueError
+        An argument is not as described, or NaN.
+
+    Examples
+    --------
+    >>> sensitivity(100, [90, 120, 130, 400], Evidence(125, 110, 132, seeds=4))
+       window   low   high  share answer
+    0    0.15  85.0  115.0   0.25   open
+    1    0.25  75.0  125.0   0.50   open
+    2    0.35  65.0  135.0   0.75    yes
+    """
+    about, values = checks.number("about", about), floats("values", values, (None,), finite=False)
+    require(len(values), "values", values, "not empty")
+    rows = []
+    for window in windows:
+        half = checks.number("windows", window, above=0) * abs(about)
+        low, high = about - half, about + half
+        share = float(np.mean((low <= values) & (values <= high)))
+        answer = Criterion("about", low, high).answer(evidence)
+        rows.append((window, low, high, share, answer))
+    return pd.DataFrame(rows, columns=["window", "low", "high", "share", "answer"])
+
+
+class Multiplicity(NamedTuple):
+    """How many criteria there are, and what that many would come to by chance.
+
+    Attributes
+    ----------
+    criteria : int
+        All of them, in all readings.
+    random : int
+        Those whose evidence has an interval.
+    by_chance : float
+        How many 95% intervals can be expected to miss their quantity: a twentieth.
+    near : tuple of str
+        The criteria whose interval ends within a tenth of its width of a bound.
+    """
+
+    criteria: int
+    random: int
+    by_chance: float
+    near: tuple[str, ...]
+
+
+def multiplicity(findings: Sequence[Finding]) -> Multiplicity:
+    """Count criteria, those that could fail by chance, and name those that nearly did, or did not.
+
+    Examples
+    --------
+    >>> half = Criterion("above a half", above=0.5)
+    >>> claim = Claim("9b", "9", "Better.", (half,), "Figure 9")
+    >>> multiplicity([claim.judge(Evidence(0.7, 0.51, 0.9, seeds=30))])
+    Multiplicity(criteria=1, random=1, by_chance=0.05, near=('9b, criterion 1',))
+    """
+    every = list(judged(findings))
+    random = [one for one in every if one.evidence.low < one.evidence.high]
+    near = tuple(one.label for one in random if _is_near(one.criterion, one.evidence))
+    return Multiplicity(len(every), len(random), len(random) / 20, near)
+
+
+def _is_near(criterion: Criterion, evidence: Evidence) -> bool:
+    """Whether the interval ends within a tenth of its width of a bound."""
+    ends = (evidence.low, evidence.high)
+    distance = min(abs(end - bound) for end in ends for bound in criterion.bounds)
+    return distance <= _half(evidence) / 5 < math.inf
 
 
 def verdicts(findings: Sequence[Finding]) -> pd.DataFrame:
@@ -285,17 +549,14 @@ def details(findings: Sequence[Finding]) -> pd.DataFrame:
     return pd.DataFrame(
         [
             {
-                "id": finding.claim.id,
-                "criterion": criterion.text,
-                "measured": f"{number(evidence.estimate)} "
-                f"[{number(evidence.low)}, {number(evidence.high)}]",
-                "seeds": evidence.seeds,
-                "met": answer,
+                "id": one.id,
+                "criterion": f"{one.reading}: " * bool(one.reading) + one.criterion.text,
+                "measured": f"{number(one.evidence.estimate)} "
+                f"[{number(one.evidence.low)}, {number(one.evidence.high)}]",
+                "seeds": one.evidence.seeds,
+                "met": one.answer,
             }
-            for finding in findings
-            for criterion, evidence, answer in zip(
-                finding.claim.criteria, finding.evidence, finding.answers, strict=True
-            )
+            for one in judged(findings)
         ]
     )
 
@@ -311,7 +572,7 @@ def record(findings: Sequence[Finding], folder: Path, *, chapter: str) -> pd.Dat
         Where the results are; `claims/<chapter>.csv` and `claims.csv` are written in it, each at
         once or not at all.
     chapter : str
-        The chapter's name, which orders the parts.
+        The chapter's name, which orders the parts: letters and digits, never a path.
 
     Returns
     -------
@@ -320,8 +581,8 @@ def record(findings: Sequence[Finding], folder: Path, *, chapter: str) -> pd.Dat
 
     Raises
     ------
-    ValueError
-        If a claim is given twice, here or in another chapter.
+    TypeError, ValueError
+        If a claim is given twice, here or in another chapter, or `chapter` is not such a name.
 
     Examples
     --------
@@ -334,16 +595,18 @@ def record(findings: Sequence[Finding], folder: Path, *, chapter: str) -> pd.Dat
     >>> rows["verdict"].tolist()
     ['holds']
     """
+    chapter = file_name("chapter", chapter)
     rows = pd.DataFrame([finding.row() for finding in findings], columns=list(COLUMNS))
+    rows["chapter"] = chapter
     parts = folder / "claims"
     parts.mkdir(parents=True, exist_ok=True)
     others = [path for path in sorted(parts.glob("*.csv")) if path.stem != chapter]
-    known = {path.stem: pd.read_csv(path, dtype={"id": str, "section": str}) for path in others}
+    text = dict.fromkeys(("id", "section", "chapter"), str)
+    known = {path.stem: pd.read_csv(path, dtype=text) for path in others}
     known[chapter] = rows
     everything = pd.concat([known[name] for name in sorted(known)], ignore_index=True)
     twice = everything.loc[everything["id"].duplicated(), "id"].tolist()
-    if twice:
-        raise ValueError(f"claims judged more than once: {', '.join(twice)}")
+    require(not twice, "findings", ", ".join(twice), "of claims that are judged only once")
     _write_atomically(rows, parts / f"{chapter}.csv")
     _write_atomically(everything, folder / "claims.csv")
     return rows

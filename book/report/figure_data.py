@@ -6,13 +6,16 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from report.names import file_name
 from report.seeds import SEEDS
+from rl_core.checks import require
 
 FOLDER = Path("../results/figures")
 
 
 def offer(name: str, table: pd.DataFrame, *, folder: Path = FOLDER) -> None:
     """Write what a figure shows as `name`.csv, to six digits: more than can be drawn."""
+    name = file_name("name", name)
     folder.mkdir(parents=True, exist_ok=True)
     table.to_csv(folder / f"{name}.csv", index=False, float_format="%.6g")
 
@@ -46,9 +49,7 @@ def tidy(
     1   a     0       20    2.0
     """
     for arm, curves in arms.items():
-        if np.shape(curves) != (len(seeds), len(x)):
-            raise ValueError(
-                f"arms[{arm!r}] has the shape {np.shape(curves)}; allowed is {len(seeds), len(x)}"
-            )
+        fits = np.shape(curves) == (len(seeds), len(x))
+        require(fits, f"arms[{arm!r}]", np.shape(curves), f"of the shape {len(seeds), len(x)}")
     index = pd.MultiIndex.from_product([arms, seeds, x], names=["arm", "seed", "episode"])
     return pd.DataFrame({value: np.stack(list(arms.values())).ravel()}, index).reset_index()

@@ -4,13 +4,14 @@ from pathlib import Path
 
 import pandas as pd
 
+from rl_core.checks import integer
 from rl_core.experiments import Results
 from rl_core.experiments.provenance import LIBRARIES
 
 
 def keep(results: Results, folder: Path, *, chapter: int) -> None:
     """Write a chapter's provenance, a row an arm and seed, as `provenance/<chapter>.csv`."""
-    path = folder / "provenance" / f"{chapter}.csv"
+    path = folder / "provenance" / f"{integer('chapter', chapter, 1)}.csv"
     path.parent.mkdir(parents=True, exist_ok=True)
     results.provenance.assign(chapter=chapter).to_csv(path, index=False)
 

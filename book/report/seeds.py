@@ -51,7 +51,7 @@ def premise(sentence: str, holds: bool, *, preview: bool | None = None) -> None:
     AssertionError: the data do not bear out: One and one is three.
     """
     if not isinstance(sentence, str):
-        raise TypeError(f"sentence is {sentence!r}; allowed is a str")
+        raise TypeError(f"sentence must be a str, got {sentence!r}")
     if not holds and not (PREVIEW if preview is None else preview):
         raise AssertionError(f"the data do not bear out: {sentence}")
 

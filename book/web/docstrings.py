@@ -9,6 +9,7 @@ from itertools import groupby
 from operator import itemgetter
 from typing import Any
 
+from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.ext import napoleon
 
@@ -68,9 +69,17 @@ def skip(
     return True if str(member.__doc__).startswith("Alias for field number") else None
 
 
+def unwrap(_app: Sphinx, doctree: nodes.document) -> None:
+    """Set free what Sphinx puts into a paragraph although it is one, or a list: invalid in HTML."""
+    for paragraph in list(doctree.findall(nodes.paragraph)):
+        if any(isinstance(child, nodes.paragraph | nodes.bullet_list) for child in paragraph):
+            paragraph.replace_self(paragraph.children)
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register with Sphinx."""
     app.setup_extension("sphinx.ext.autodoc")
     app.connect("autodoc-process-docstring", process)
     app.connect("autodoc-skip-member", skip)
+    app.connect("doctree-read", unwrap)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,26 +1,52 @@
-"""Print the book, built as a single page, to a PDF: `python paper.py page.html book.pdf`."""
+"""Print the built book to a PDF: `python paper.py _build/html book.pdf`.
 
+The pages are put one behind the other as they were built, nothing is executed again. Reference and
+index stay with the site. Where a heading lands is known only once it is printed, so the book is
+printed twice: the second time its contents have page numbers.
+"""
+
+import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from urllib.parse import unquote, urldefrag
 
-from web.chromium import NoBrowserError, open_browser
+import yaml
+from bs4 import BeautifulSoup, Tag
+from chromium import NoBrowserError, open_browser
+from playwright.sync_api import Browser
 
+ROOT = Path(__file__).parents[2]
+LEFT_OUT = ("api",)
 STYLE = """
-    .sidebar-toggle, .header-article, .bd-header-article, .bd-sidebar-secondary, .prev-next-footer,
-    button, .admonition-title::after { display: none !important; }
-    .bd-article, .bd-main, .bd-content, .bd-article-container
-      { max-width: 100% !important; padding: 0 !important; }
-    html { font-size: 13px !important; }
-    span[id^="document-"] + section { break-before: page; }
-    details.hide { display: none; }
-    .cell_output img, figure img { max-height: 85mm; width: auto !important; margin: auto; }
+    html { font-size: 12px !important; }
+    body { background: white; }
+    button:not(th button), .headerlink, details.hide, .sorts, .toctree-wrapper,
+    .tableofcontents-wrapper, .admonition-title::after { display: none !important; }
+    article { max-width: 100% !important; padding: 0 !important; }
+    article { break-before: page; }
+    article h1 { margin-top: 0; }
+    .printed-contents ol { columns: 2; column-gap: 3em; list-style: none; padding: 0; }
+    .printed-contents a { display: flex; gap: 0.3em; color: inherit; text-decoration: none; }
+    .printed-contents a::before { content: ""; order: 1; flex: 1; margin: 0 0.5em;
+      border-bottom: 1px dotted; }
+    .printed-contents .page { order: 2; }
+    .printed-contents .title { break-after: avoid; font-weight: bold; margin-top: 0.6em; }
+    .printed-contents .section { margin-left: 1.5em; }
+    .cell_output img, figure img { max-height: 68mm; max-width: 100%; width: auto !important;
+      height: auto !important; margin: auto; display: block; }
+    .cell_output img[alt^="A picture from the film"] { max-height: 50mm; }
+    .thumbnails { grid-template-columns: 1fr 1fr !important; }
     .sd-row > * { flex: 0 0 50% !important; width: 50% !important; }
     .sd-row img { max-height: 60mm; }
     h1, h2, h3, h4 { break-after: avoid; }
-    figure, img, table, .math { break-inside: avoid; }
+    p, li { orphans: 2; widows: 2; }
+    figure, img, tr, .math, .thumbnail, .cell:has(img) { break-inside: avoid; }
+    .cell:has(img, video) { break-after: avoid; }
+    table { font-size: 0.8em !important; }
     pre { white-space: pre-wrap !important; overflow-wrap: anywhere; }
-    div.cell_output, table { overflow: visible !important; }
-    td, th { overflow-wrap: break-word; white-space: normal !important; }
+    div.cell_output, .output, table { overflow: visible !important; }
+    td, th { overflow-wrap: break-word; white-space: normal !important; padding: 0.2em 0.4em; }
     """
 
 # A film becomes the picture in its middle, with a word on where it moves.
@@ -56,33 +82,139 @@ NUMBER = (
 )
 
 
-def print_page(page: Path, pdf: Path) -> None:
-    """Print a page of HTML to a PDF in A4, with page numbers.
+def pages(site: Path) -> list[Path]:
+    """The built pages in the order of the book, but for those that are left out."""
+    toc = yaml.safe_load((ROOT / "_toc.yml").read_text(encoding="utf-8"))
+    parts = [*toc.get("parts", []), {"chapters": toc.get("chapters", [])}]
+    names = [toc["root"], *(page["file"] for part in parts for page in part["chapters"])]
+    return [site / f"{name}.html" for name in names if Path(name).stem not in LEFT_OUT]
 
-    Raises
-    ------
-    web.chromium.NoBrowserError
-        If no browser is installed.
-    """
-    with open_browser() as browser, browser.new_context(color_scheme="light") as context:
+
+def name_of(page: Path, fragment: str) -> str:
+    """The address of a place on a page, within the one document."""
+    return f"p{page.stem}--{unquote(fragment)}"
+
+
+def article(page: Path, printed: set[Path]) -> Tag:
+    """Return what a page says, its links and addresses made fit for the one document."""
+    text = BeautifulSoup(page.read_text(encoding="utf-8"), "html.parser").find("article")
+    assert isinstance(text, Tag), f"{page} has no article"
+    text["id"] = ""
+    for tag in text.find_all(id=True):
+        tag["id"] = name_of(page, tag["id"])
+    for style in text.find_all("style"):  # of tables, by their addresses
+        style.string = style.get_text().replace("#T_", f"#{name_of(page, 'T_')}")
+    for tag in text.find_all(src=True):
+        if "://" not in tag["src"] and not tag["src"].startswith("data:"):
+            tag["src"] = (page.parent / unquote(tag["src"])).resolve().as_uri()
+    for link in text.find_all("a", href=True):
+        address, fragment = urldefrag(link["href"])
+        if "://" in address or address.startswith("mailto:"):
+            continue
+        target = (page.parent / unquote(address)).resolve() if address else page
+        if target in printed:
+            link["href"] = f"#{name_of(target, fragment)}"
+        else:
+            del link["href"]  # a download, or what only the site has
+    return text
+
+
+def contents(articles: list[Tag], numbers: dict[str, int]) -> Iterator[str]:
+    """The lines of the list of contents: chapters, sections, and where they begin."""
+    for text in articles:
+        for heading in text.find_all(["h1", "h2"]):
+            section = heading.find_parent("section")
+            if section is None or heading.find_parent(class_="onlyprint"):
+                continue
+            for link in heading.find_all(class_="headerlink"):
+                link.decompose()
+            kind = "title" if heading.name == "h1" else "section"
+            number = numbers.get(section["id"], "")
+            title = f"{heading.decode_contents()} <span class='page'>{number}</span>"
+            yield f'<li class="{kind}"><a href="#{section["id"]}">{title}</a></li>'
+
+
+def document(site: Path, numbers: dict[str, int]) -> str:
+    """Return the book as one page of HTML."""
+    files = pages(site)
+    first = BeautifulSoup(files[0].read_text(encoding="utf-8"), "html.parser")
+    addresses = [link["href"].split("?")[0] for link in first.find_all("link", rel="stylesheet")]
+    sheets = [(files[0].parent / address).resolve().as_uri() for address in addresses]
+    styles = [f'<link rel="stylesheet" href="{sheet}">' for sheet in sheets]
+    articles = [article(page, set(files)) for page in files]
+    mathjax = (site / "_static/mathjax/tex-chtml.js").as_uri()
+    front, *others = articles
+    lines = "\n".join(contents(articles, numbers))
+    return f"""<!doctype html><html lang="en" data-theme="light"><head><meta charset="utf-8">
+        <title>{first.title.get_text()}</title>{"".join(styles)}<style>{STYLE}</style>
+        <script>window.MathJax = {{options: {{processHtmlClass: "math"}}}}</script>
+        <script src="{mathjax}" defer></script></head><body>
+        <nav class="printed-contents"><h1>Contents</h1><ol>{lines}</ol></nav>
+        {front}{"".join(map(str, others))}</body></html>"""
+
+
+def places(pdf: bytes) -> dict[str, int]:
+    """Return on which page each address of a PDF is that Chromium wrote, counted from 1."""
+    objects = dict(re.findall(rb"\n(\d+) 0 obj\n(.*?)\nendobj", pdf, re.DOTALL))
+
+    def below(number: bytes) -> Iterator[bytes]:
+        kids = re.search(rb"/Kids \[(.*?)\]", objects[number], re.DOTALL)
+        if kids is None:
+            yield number
+        else:
+            for kid in re.findall(rb"(\d+) 0 R", kids[1]):
+                yield from below(kid)
+
+    catalog = next(text for text in objects.values() if b"/Type /Catalog" in text)
+    order = list(below(re.search(rb"/Pages (\d+) 0 R", catalog)[1]))
+    named = objects[re.search(rb"/Dests (\d+) 0 R", catalog)[1]]
+    found = re.findall(rb"/(\S+) \[(\d+) 0 R", named)
+    return {
+        re.sub(r"#(..)", lambda code: chr(int(code[1], 16)), name.decode()): order.index(page) + 1
+        for name, page in found
+    }
+
+
+def print_page(browser: Browser, page: Path) -> bytes:
+    """Print a page of HTML in A4, with page numbers."""
+    with browser.new_context(color_scheme="light") as context:
         window = context.new_page()
+        window.set_default_timeout(240_000)  # milliseconds: for a machine that is busy
         window.goto(page.resolve().as_uri(), wait_until="load")
         window.evaluate(STILLS)
-        window.add_style_tag(content=STYLE)
-        window.pdf(
-            path=pdf,
+        return window.pdf(
             format="A4",
-            margin=dict.fromkeys(("top", "bottom", "left", "right"), "18mm"),
+            margin=dict.fromkeys(("top", "bottom", "left", "right"), "16mm"),
             display_header_footer=True,
             header_template="<span></span>",
             footer_template=NUMBER,
+            print_background=True,
             outline=True,
             tagged=True,
         )
 
 
+def print_book(site: Path, pdf: Path) -> None:
+    """Print a built book.
+
+    Raises
+    ------
+    chromium.NoBrowserError
+        If no browser is installed.
+    """
+    whole = pdf.with_suffix(".html")
+    numbers: dict[str, int] = {}
+    with open_browser() as browser:
+        for _ in range(2):
+            whole.write_text(document(site.resolve(), numbers), encoding="utf-8")
+            printed = print_page(browser, whole)
+            numbers = places(printed)
+    pdf.write_bytes(printed)
+    whole.unlink()
+
+
 if __name__ == "__main__":
     try:
-        print_page(*map(Path, sys.argv[1:]))
+        print_book(*map(Path, sys.argv[1:]))
     except NoBrowserError as error:
         sys.exit(str(error))

@@ -6,7 +6,7 @@
 import sys
 from pathlib import Path
 
-from web.chromium import NoBrowserError, open_browser
+from chromium import NoBrowserError, open_browser
 
 WINDOW = {"width": 1300, "height": 1200}  # all of it in sight at once
 # Four in a row, over the full width and with nothing in front.

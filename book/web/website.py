@@ -1,12 +1,25 @@
-"""A Sphinx extension: what all pages of the site have, or have not, beyond the settings."""
+"""A Sphinx extension: what all pages of the site have, or have not, beyond the settings.
 
+Pages are light: mathematics only where there are formulas, no script that holds up the first
+picture, of the theme's icon font only what is used, every picture with its size, so that nothing
+moves when it comes.
+"""
+
+import base64
+import html
+import re
+import shutil
+import struct
+from pathlib import Path
 from typing import Any
 
 import sphinx_thebe
+from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.config import Config
 
 from report.seeds import FULL, PREVIEW, SEEDS
+from web import icons
 
 BANNER = (
     f"<strong>Preview with {len(SEEDS)} seeds.</strong> Numbers, intervals and verdicts are not "
@@ -31,8 +44,114 @@ def without_thebe(app: Sphinx) -> None:
             app.disconnect(listener.id)
 
 
+def describe(
+    app: Sphinx, page: str, _template: str, context: dict[str, Any], doctree: nodes.document | None
+) -> None:
+    """Give a page a description for search engines, and mathematics only if it has any.
+
+    Sphinx counts the formulas of all pages that a page lists among its own. The front page is not
+    named twice in its title.
+    """
+    if doctree is not None and not any(doctree.findall(is_formula)):
+        others = [it for it in context["script_files"] if "mathjax" not in str(it.filename)]
+        context["script_files"] = [it for it in others if "MathJax" not in str(it.attributes)]
+    if page == app.config.root_doc:
+        context["docstitle"] = ""
+    text = first_sentences(doctree) if doctree is not None else ""
+    if text:
+        tag = f'<meta name="description" content="{html.escape(text)}" />'
+        context["metatags"] = context.get("metatags", "") + tag
+
+
+def is_formula(node: nodes.Node) -> bool:
+    """Whether it is one in a line or on a line of its own."""
+    return isinstance(node, nodes.math | nodes.math_block)
+
+
+def first_sentences(doctree: nodes.document, length: int = 160) -> str:
+    """Return the first paragraph of some length, up to the end of a sentence if there is one."""
+    paragraphs = (node.astext().replace("\n", " ") for node in doctree.findall(nodes.paragraph))
+    text = next((paragraph for paragraph in paragraphs if len(paragraph) > length / 2), "")
+    cut = text[:length]
+    return (
+        cut if len(text) <= length else cut[: cut.rfind(". ") + 1] or cut.rpartition(" ")[0] + " …"
+    )
+
+
+def size(picture: bytes) -> tuple[int, int]:
+    """Return width and height of a PNG in pixels, from its beginning.
+
+    Examples
+    --------
+    >>> size(bytes(16) + bytes([0, 0, 0, 7, 0, 0, 1, 0]))
+    (7, 256)
+    """
+    width, height = struct.unpack(">II", picture[16:24])
+    return width, height
+
+
+def sized(tag: re.Match[str], page: Path) -> str:
+    """Give a picture its width and height."""
+    source = re.search(r'src="(data:image/png;base64,)?([^":]+)"', tag[0])
+    if source is None or " width=" in tag[0]:
+        return tag[0]
+    if source[1]:
+        picture = base64.b64decode(source[2][:32])
+    elif source[2].endswith(".png") and (page.parent / source[2]).exists():
+        picture = (page.parent / source[2]).read_bytes()
+    else:
+        return tag[0]
+    width, height = size(picture)
+    return f'<img width="{width}" height="{height}"{tag[1]}'
+
+
+def lightened(text: str, page: Path) -> str:
+    """Rewrite a built page: icons, scripts that wait, sizes of pictures, no empty headings.
+
+    Parameters
+    ----------
+    text : str
+        The page's HTML.
+    page : Path
+        Where it is: its pictures are found from there.
+    """
+    text = re.sub(r"\s*<(script|link)[^>]*/fontawesome/[^>]*>(</script>)?", "", text)
+    head, body = text.split("</head>", 1)
+    # In a head, a script waits for the page, but for the first, which inline ones build upon.
+    head = re.sub(
+        r"<script (?![^>]*\b(?:defer|async)\b)(?![^>]*documentation_options)([^>]*\bsrc=)",
+        r"<script defer \1",
+        head,
+    )
+    body = re.sub(r"<img((?:\s[^>]*)?>)", lambda tag: sized(tag, page), body)
+    body = re.sub(r"<th(?:\s[^>]*)?>(?:\s|&nbsp;)*</th>", "<td></td>", body)
+    # Read out is what can be read, not another name for it.
+    body = re.sub(
+        r'(<summary|<button[^>]*search-button-field[^>]*) aria-label="[^"]*"', r"\1", body
+    )
+    return head + "</head>" + body
+
+
+def lighten(app: Sphinx, error: Exception | None) -> None:
+    """Rewrite all pages, and write the icons that they use."""
+    if error is not None or app.builder.name != "html":
+        return
+    site = Path(app.outdir)
+    pages = [page for page in site.rglob("*.html") if "_static" not in page.parts]
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        if "</head>" in text:
+            page.write_text(lightened(text, page), encoding="utf-8")
+    (site / "_static/icons.css").write_text(icons.style(site), encoding="utf-8")
+    shutil.rmtree(site / "_static/vendor/fontawesome")
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register with Sphinx."""
     app.connect("config-inited", announce)
     app.connect("builder-inited", without_thebe)
+    app.connect("builder-inited", lambda app: app.set_html_assets_policy("per_page"))
+    app.connect("html-page-context", describe, priority=900)
+    app.connect("build-finished", lighten, priority=900)  # when all files are where they belong
+    app.add_css_file("icons.css")
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -46,7 +46,7 @@ class Progress:
             total=sum(seeds.values()),
             disable=not show,
             file=self._screen,
-            mininterval=LOG_SECONDS if isinstance(self._screen, _Log) else DRAW_SECONDS,
+            mininterval=LOG_SECONDS if type(self._screen) is _Log else DRAW_SECONDS,
             bar_format=FORMAT if self._screen else None,
             dynamic_ncols=self._screen is None,
             leave=self._screen is None,

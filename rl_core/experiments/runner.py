@@ -159,7 +159,8 @@ def run(
     instance("store", store, Store | Path | str, "a folder's path or a Store")
     identities = [arm.check() for arm in arms]
     store = Store(Path(store.path if isinstance(store, Store) else store).resolve())
-    store.clean()
+    with _told(store):
+        store.clean()
     tasks = [
         Task(arm, seed, identity, digest({**identity, "seed": seed}))
         for arm, identity in zip(arms, identities, strict=True)
@@ -207,13 +208,8 @@ def _present(task: Task, result: Stored | None) -> Stored:
 
 def _work(tasks: Sequence[Task], store: Store, workers: int, backend: str, progress: bool) -> None:
     """Run and store `tasks` over the workers; raise at the end if some could not be done."""
-    try:
-        with scratch(store.path / "scratch"):
-            pass
-    except OSError as error:
-        raise ValueError(
-            f"store must be a folder that can be written, got {str(store.path)!r}: {error.strerror}"
-        ) from error
+    with _told(store), scratch(store.path / "scratch"):
+        pass
     first = {task.digest: task for task in reversed(tasks)}  # arms may differ in name only
     work = _longest_first([task for task in tasks if first[task.digest] is task], store)
     failed: list[Outcome] = []
@@ -228,6 +224,17 @@ def _work(tasks: Sequence[Task], store: Store, workers: int, backend: str, progr
     if failed:
         message = f"{len(failed)} of {len(work)} seeds failed; the others are stored"
         raise ExceptionGroup(message, [outcome.exception() for outcome in failed])
+
+
+@contextmanager
+def _told(store: Store) -> Iterator[None]:
+    """Say which argument is meant if the block cannot use the store."""
+    try:
+        yield
+    except OSError as error:
+        raise ValueError(
+            f"store must be a folder that can be written, got {str(store.path)!r}: {error.strerror}"
+        ) from error
 
 
 @contextmanager

@@ -19,9 +19,10 @@ Source: V. Mnih et al. (2015), Human-level control through deep reinforcement le
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba.extending import overload
 from numpy.typing import NDArray
 
 from rl_core.kernels import choices, networks
@@ -141,9 +142,25 @@ def make_learner(
     )
 
 
+def q_values(learner: Any, observation: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Q(s, .; theta) of one state, float64 of shape (A,); of any learner, compiled or not.
+
+    Examples
+    --------
+    >>> way = Settings(0.9, 2, 1, 1, 10, 1, 1e-3, True, False, 3)
+    >>> theta = np.array([1, 0, 0, 1, 2, 2, 0, 0, 0], np.float32)
+    >>> learner = make_learner((2, 3), theta, way, np.zeros(6), biases=False)
+    >>> q_values(learner, np.array([5, 7], np.float32))
+    array([ 5.,  7., 24.])
+    """
+    if isinstance(learner, Learner):
+        return _q_values(learner, observation)
+    values: NDArray[np.float64] = learner.q_values(observation)
+    return values
+
+
 @compiled
-def q_values(learner: Learner, observation: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Q(s, .; theta) of one state, float64 of shape (A,)."""
+def _q_values(learner: Learner, observation: NDArray[np.float32]) -> NDArray[np.float64]:
     units = learner.one
     for i in range(observation.size):
         units[i] = observation[i]
@@ -246,13 +263,12 @@ def loss_gradient(learner: Learner, memory: Memory) -> float:
     return loss
 
 
-@compiled
-def update(learner: Learner, memory: Memory) -> bool:
+def update(learner: Any, memory: Memory) -> bool:
     """Take one step of the optimiser on the sampled batch; copy the network when it is time.
 
     Parameters
     ----------
-    learner : Learner
+    learner : Learner, or what has a method `update(memory)` like `rl_core.dqn.TorchLearner`
         Its `slots` say which transitions.
     memory : Memory
 
@@ -274,6 +290,13 @@ def update(learner: Learner, memory: Memory) -> bool:
     >>> learner.parameters[:3].round(4), int(learner.counts[COPIES])
     (array([-0.001, -0.001,  0.   ], dtype=float32), 1)
     """
+    return (
+        _update(learner, memory) if isinstance(learner, Learner) else bool(learner.update(memory))
+    )
+
+
+@compiled
+def _update(learner: Learner, memory: Memory) -> bool:
     if not math.isfinite(loss_gradient(learner, memory)):
         return False
     counts, gradient, settings = learner.counts, learner.gradient, learner.settings
@@ -295,3 +318,10 @@ def update(learner: Learner, memory: Memory) -> bool:
         counts[COPIES] += 1
         choices.after_copy(learner.epsilon)
     return True
+
+
+# What the two mean in compiled code.
+overload(q_values)(
+    lambda learner, observation: lambda learner, observation: _q_values(learner, observation)
+)
+overload(update)(lambda learner, memory: lambda learner, memory: _update(learner, memory))

@@ -49,6 +49,13 @@ class Transitions(NamedTuple):
     own_rows: int
 
 
+def transitions(successor: NDArray[np.int32], probability: NDArray[np.float64]) -> Transitions:
+    """Return them as the kernels take them: probabilities that all states share are given once."""
+    shared = probability.strides[0] == 0 and len(probability) > 1
+    rows = np.ascontiguousarray(probability[:1] if shared else probability)
+    return Transitions(np.ascontiguousarray(successor), rows, int(not shared))
+
+
 @compiled
 def lookahead(
     transitions: Transitions,

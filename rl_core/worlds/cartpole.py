@@ -63,8 +63,8 @@ class CartPole:
         state[1] = velocity + _TIME_STEP * velocity_change
         state[2] = angle + _TIME_STEP * turning
         state[3] = turning + _TIME_STEP * turning_change
-        upright = -_MAX_ANGLE <= state[2] <= _MAX_ANGLE
-        return 1.0, not (upright and -_MAX_POSITION <= state[0] <= _MAX_POSITION)
+        fallen = state[2] < -_MAX_ANGLE or state[2] > _MAX_ANGLE
+        return 1.0, fallen or state[0] < -_MAX_POSITION or state[0] > _MAX_POSITION
 
     @staticmethod
     def observe(state: State, observation: Observation) -> None:

@@ -28,12 +28,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from rl_core.checks import floats, instance, integer, integers, require
 from rl_core.kernels.compiled import compiled
-from rl_core.worlds.environments import EnvironmentLike, opened
+from rl_core.worlds.environments import EnvironmentLike, checked_reward, opened
 from rl_core.worlds.names import find
 from rl_core.worlds.tasks import Kernel, Task
 from rl_core.worlds.twins import twin
 
-MAX_CELLS = 2**31 - 1
+MAX_CELLS, MAX_ACTIONS = 2**31 - 1, 2**16
 
 
 class Grid(NamedTuple):
@@ -77,7 +77,7 @@ def make_grid(
 
     Raises
     ------
-    ValueError
+    TypeError, ValueError
         If the space is no Box, a bound is infinite or the lower not below the upper, a number of
         bins is not a positive integer, there is not one for each dimension, or a table would have
         more than 2^31 - 1 cells.
@@ -97,7 +97,12 @@ def make_grid(
         finite = bool(np.isfinite(bound).all())
         require(finite, name, bound.tolist(), "finite in every dimension; give bounds to use")
         bounds.append(bound)
-    require(bool((bounds[0] < bounds[1]).all()), "low", bounds[0].tolist(), "below high")
+    with np.errstate(over="ignore"):
+        width = bounds[1] - bounds[0]
+    apart = bool(((width > 0) & (width < np.inf)).all())
+    require(
+        apart, "low", bounds[0].tolist(), f"below high, {bounds[1].tolist()}, by a finite width"
+    )
     numbers = checked_bins("bins", bins)
     numbers = (numbers,) * d if isinstance(numbers, int) else numbers
     require(len(numbers) == d, "bins", bins, f"a positive integer, or {d} of them")
@@ -114,7 +119,7 @@ def checked_bins(name: str, bins: object) -> int | tuple[int, ...]:
     >>> checked_bins("bins", [10, 20])
     (10, 20)
     """
-    if isinstance(bins, Sequence | np.ndarray) and not isinstance(bins, str):
+    if isinstance(bins, tuple | list | range) or (isinstance(bins, np.ndarray) and bins.ndim):
         require(len(bins) > 0, name, bins, "a positive integer, or one a dimension")
         return integers(name, bins, 1)
     return integer(name, bins, 1)
@@ -123,6 +128,13 @@ def checked_bins(name: str, bins: object) -> int | tuple[int, ...]:
 @compiled
 def cell(grid: Grid, observation: NDArray[np.float32]) -> int:
     """Number of the cell that an observation falls into, from 0.
+
+    An infinity falls into the last or the first bin, like any number beyond the bounds.
+
+    Raises
+    ------
+    ValueError
+        For NaN, which has no cell.
 
     Examples
     --------
@@ -133,8 +145,10 @@ def cell(grid: Grid, observation: NDArray[np.float32]) -> int:
     index = 0
     for k in range(observation.size):
         width = grid.high[k] - grid.low[k]
-        i = math.floor(grid.bins[k] * ((np.float64(observation[k]) - grid.low[k]) / width))
-        index = index * grid.bins[k] + min(max(i, 0), grid.bins[k] - 1)
+        x = grid.bins[k] * ((np.float64(observation[k]) - grid.low[k]) / width)
+        if math.isnan(x):
+            raise ValueError("env must keep to its spaces: NaN was observed, which has no cell")
+        index = index * grid.bins[k] + int(min(max(x, 0.0), grid.bins[k] - 1.0))
     return index
 
 
@@ -155,8 +169,9 @@ def action_levels(space: spaces.Space[Any], levels: int | None) -> NDArray[np.fl
 
     Raises
     ------
-    ValueError
-        If the space is neither, not bounded, or `levels` does not go with it.
+    TypeError, ValueError
+        If the space is neither, not bounded, or `levels` does not go with it, or makes more than
+        2^16 actions.
 
     Examples
     --------
@@ -173,6 +188,8 @@ def action_levels(space: spaces.Space[Any], levels: int | None) -> NDArray[np.fl
     require(bounded, "env's action space", space, "bounded")
     require(levels is not None, "levels", levels, "an integer from 2 where actions are a Box")
     levels = integer("levels", levels, 2)
+    few = levels ** len(low) <= MAX_ACTIONS
+    require(few, "levels", levels, f"such that there are at most {MAX_ACTIONS} actions")
     ticks = [np.linspace(a, b, levels) for a, b in zip(low, high, strict=True)]
     return np.array(list(product(*ticks)), np.float32)
 
@@ -220,7 +237,7 @@ class Discretised(gymnasium.Wrapper[Any, Any, Any, Any]):
         made = opened(env)
         self.grid = make_grid(made.observation_space, bins, low=low, high=high)
         self.levels = action_levels(made.action_space, levels)
-        self._native = made.action_space
+        self._native, self._steps = made.action_space, 0
         super().__init__(made)
         self.observation_space = spaces.Discrete(self.grid.n_cells)
         self.action_space = spaces.Discrete(len(self.levels))
@@ -230,28 +247,36 @@ class Discretised(gymnasium.Wrapper[Any, Any, Any, Any]):
     ) -> tuple[int, dict[str, Any]]:
         """Begin an episode; see `gymnasium.Env.reset`."""
         observation, info = self.env.reset(seed=seed, options=options)
+        self._steps = 0
         return self._cell(observation), info
 
     def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
         """Take the action of this number; see `gymnasium.Env.step`."""
+        self._steps += 1
         taken: Any = self.levels[action]
         if isinstance(self._native, spaces.Discrete):
             taken = int(taken[0]) + int(self._native.start)
         elif isinstance(self._native, spaces.Box):
             taken = taken.astype(self._native.dtype).reshape(self._native.shape)
         observation, reward, terminated, truncated, info = self.env.step(taken)
-        return self._cell(observation), float(reward), terminated, truncated, info
+        reward = checked_reward(f"{self.env}, at step {self._steps} of an episode", reward)
+        return self._cell(observation), reward, terminated, truncated, info
 
     def _cell(self, observation: Any) -> int:
         """Number the cell; compiled code relies on the observation's size."""
-        flat = np.ravel(observation)
-        fits = flat.size == self.grid.bins.size and flat.dtype.kind in "fiub"
-        if not fits or np.isnan(flat).any():
+        space = self.env.observation_space
+        try:
+            seen = np.asarray(observation)
+        except ValueError:  # ragged nesting
+            seen = np.asarray(None)
+        fits = seen.shape == space.shape and seen.dtype.kind in "fiub"
+        if not fits or np.isnan(seen).any():
             raise ValueError(
-                f"env must keep to its spaces: from {self.env}, the observation {observation!r} "
-                f"came, which has no cell; its observation space is {self.env.observation_space}"
+                f"env must keep to its observation space {space}, from {self.env}, at step "
+                f"{self._steps} of an episode, came {observation!r}, which has no cell"
             )
-        return int(cell(self.grid, flat.astype(np.float32)))
+        with np.errstate(over="ignore"):
+            return int(cell(self.grid, seen.ravel().astype(np.float32)))
 
 
 class GriddedTask(NamedTuple):

@@ -42,7 +42,7 @@ class MountainCar:
     def start(rng: np.random.Generator, state: State, observation: Observation) -> None:
         """Draw the position; the car stands."""
         state[0], state[1] = rng.uniform(-0.6, -0.4), 0.0
-        observation[:] = state
+        observation[0], observation[1] = state[0], state[1]
 
     @staticmethod
     def step(state: State, action: Action) -> tuple[float, bool]:
@@ -60,4 +60,4 @@ class MountainCar:
     @staticmethod
     def observe(state: State, observation: Observation) -> None:
         """Observe the whole state."""
-        observation[:] = state
+        observation[0], observation[1] = state[0], state[1]

@@ -46,7 +46,7 @@ class MountainCarContinuous:
     def start(rng: np.random.Generator, state: State, observation: Observation) -> None:
         """Draw the position; the car stands."""
         state[0], state[1], state[2] = rng.uniform(-0.6, -0.4), 0.0, 0.0
-        observation[:] = state[:2]
+        observation[0], observation[1] = state[0], state[1]
 
     @staticmethod
     def step(state: State, action: Action) -> tuple[float, bool]:
@@ -78,4 +78,4 @@ class MountainCarContinuous:
     @staticmethod
     def observe(state: State, observation: Observation) -> None:
         """Observe position and velocity."""
-        observation[:] = state[:2]
+        observation[0], observation[1] = state[0], state[1]

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from rl_core.imports import code_behind, imported
 from rl_core.kernels.compiled import compiled
+from rl_core.worlds.tasks import _FirstClass
 
 ORIGINAL = "rl_core.worlds.shaping:original"
 """The environment's own reward."""
@@ -40,8 +41,9 @@ def tip_height(observation: NDArray[np.float32], reward: float) -> float:
 
     Examples
     --------
-    >>> tip_height(np.array([1, 0, 1, 0, 0, 0], np.float32), -1.0)
-    -2.0
+    >>> hanging, bent = [1, 0, 1, 0, 0, 0], [0, 1, 0.6, 0.8, 5, 7]  # cosine, sine, cosine, sine
+    >>> [tip_height(np.array(o, np.float32), -1.0) for o in (hanging, bent)]
+    [-2.0, 0.800000011920929]
     """
     cosine1, sine1 = float(observation[0]), float(observation[1])
     cosine2, sine2 = float(observation[2]), float(observation[3])
@@ -55,8 +57,8 @@ def distance_from_start(observation: NDArray[np.float32], reward: float) -> floa
 
     Examples
     --------
-    >>> distance_from_start(np.array([-1.0, 0.0], np.float32), -1.0)
-    0.5
+    >>> distance_from_start(np.array([-0.75, 0.03], np.float32), -1.0)
+    0.25
     """
     return abs(float(observation[0]) + 0.5)
 
@@ -69,8 +71,8 @@ def balance(observation: NDArray[np.float32], reward: float) -> float:
 
     Examples
     --------
-    >>> balance(np.zeros(4, np.float32), 1.0)
-    0.05
+    >>> round(balance(np.array([-0.6, 3, 0.1, 5], np.float32), 1.0), 6)  # (1 - 1/4 - 1/5) / 20
+    0.0275
     """
     return (reward - abs(float(observation[0])) / 2.4 - 2 * abs(float(observation[2]))) / 20
 
@@ -101,14 +103,14 @@ class Shaping:
     code: str = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        imported("shaping", self.function)
+        imported("function", self.function)
         try:
             compiled_shape(self.function)
         except (AttributeError, TypeError, ValueError, numba.NumbaError) as error:
             reason = str(error).strip().splitlines()[0] if str(error).strip() else "no reason given"
             raise ValueError(
-                "shaping must name a function f(observation, reward) -> float that numba compiles, "
-                f"got {self.function!r} ({reason})"
+                "function must be an import path of f(observation, reward) -> float that numba "
+                f"compiles, got {self.function!r} ({reason})"
             ) from error
         object.__setattr__(self, "code", code_behind(self.function))
 
@@ -117,9 +119,37 @@ class Shaping:
 def compiled_shape(function: str) -> Any:
     """Compile the function at "module:name" to what compiled code can call.
 
-    Every shape has the same type, so that no kernel has to be compiled anew for another one.
+    Every shape has the same type, so that no kernel has to be compiled anew for another one. An
+    index beyond the observation is an IndexError, which reaches the caller of the loop.
     """
-    return numba.cfunc(_SIGNATURE)(imported("shaping", function))
+    options = {"nopython": True, "nogil": True, "error_model": "numpy", "boundscheck": True}
+    shape: Any = _FirstClass(imported("shaping", function), targetoptions=options)
+    shape.compile_only(_SIGNATURE)
+    return shape
+
+
+def shape_for(shaping: Shaping | None, n_observations: int) -> Any:
+    """Return a compiled shape if it is for observations of this length; the original for None.
+
+    Raises
+    ------
+    ValueError
+        It looks for more numbers than there are.
+
+    Examples
+    --------
+    >>> shape_for(Shaping("rl_core.worlds.shaping:tip_height"), 2)
+    Traceback (most recent call last):
+    ValueError: shaping must be a function of observations of 2 numbers, got 'rl_core.worlds.shap...
+    """
+    function = ORIGINAL if shaping is None else shaping.function
+    shape = compiled_shape(function)
+    try:
+        shape(np.zeros(n_observations, np.float32), 0.0)
+    except IndexError as error:
+        allowed = f"a function of observations of {n_observations} numbers"
+        raise ValueError(f"shaping must be {allowed}, got {function!r} ({error})") from None
+    return shape
 
 
 @compiled

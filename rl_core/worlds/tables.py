@@ -92,7 +92,7 @@ def _table(env: gym.Env[Any, Any]) -> list[list[list[Any]]]:
     name = type(env).__name__
     table: Any = getattr(env, "P", None)
     if table is None:
-        raise ValueError(f"env must be an environment with a transition table P, {name} has none")
+        raise ValueError(f"env must have a transition table P, {name} has none")
     malformed = f"env: the table P of {name} is malformed:"
     rows: list[list[list[Any]]] = []
     try:

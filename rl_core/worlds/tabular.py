@@ -10,6 +10,7 @@ first two.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from operator import index
 from typing import Any, NamedTuple
 
@@ -85,7 +86,8 @@ def model_arrays(mdp: MDP) -> Model:
     )
 
 
-class Played(NamedTuple):
+@dataclass
+class Played:
     """An environment with Discrete spaces; its numbers are counted from 0 here.
 
     Attributes
@@ -94,11 +96,17 @@ class Played(NamedTuple):
         The environment, wrapped or not.
     observations, actions : gymnasium.spaces.Discrete
         Its spaces.
+    steps : int
+        Steps of the episode so far.
     """
 
     env: gym.Env[Any, Any]
     observations: spaces.Discrete[Any]
     actions: spaces.Discrete[Any]
+    steps: int = 0
+
+    def __str__(self) -> str:
+        return f"{self.env}, at step {self.steps} of an episode"
 
 
 def played(env: EnvironmentLike) -> Played:
@@ -213,18 +221,16 @@ def _start_in_env(world: Played, draws: Draws) -> int:
     base = world.env.unwrapped
     base.np_random = draws.start
     observation, _ = world.env.reset()
+    world.steps = 0
     base.np_random = draws.step
     return _state(world, observation)
 
 
 def _step_in_env(world: Played, a: int) -> tuple[int, float, bool, bool]:
+    world.steps += 1
     observation, r, terminated, truncated, _ = world.env.step(int(a + world.actions.start))
-    return (
-        _state(world, observation),
-        checked_reward(world.env, r),
-        bool(terminated),
-        bool(truncated),
-    )
+    s_next, r = _state(world, observation), checked_reward(world, r)
+    return s_next, r, bool(terminated), bool(truncated)
 
 
 def _state(world: Played, observation: Any) -> int:
@@ -235,7 +241,7 @@ def _state(world: Played, observation: Any) -> int:
         state = -1
     if not 0 <= state < world.observations.n:
         raise ValueError(
-            f"env must keep to its spaces: from {world.env}, the observation {observation!r} came; "
-            f"its observation space is {world.observations}"
+            f"env must keep to its observation space {world.observations}, from {world}, came "
+            f"{observation!r}"
         )
     return state

@@ -9,7 +9,8 @@ A task is a class with three functions, given to the decorator `task`:
 `state` is a float64 vector of the length that the task declares, `observation` a float32 vector,
 `action` a float32 vector: the continuous action, or, of length 1, the index of a discrete one.
 The functions are compiled when they are first needed; they may call others that are compiled with
-`rl_core.kernels.compiled.compiled` or `numba.njit`. Constants of their module are frozen as they then are.
+`rl_core.kernels.compiled.compiled` or `numba.njit`. Constants of their module are frozen as they
+then are.
 
 A loop takes a `Kernel`. Its functions have one type for all tasks, the signatures above, so that a
 loop is compiled once and then plays every task, also those that were written after it.
@@ -22,14 +23,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from types import FunctionType as PlainFunction
+from types import FunctionType, SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
 from numba.core import types
 from numba.core.registry import CPUDispatcher
-from numba.core.types import FunctionType, boolean, float32, float64, void
+from numba.core.types import boolean, float32, float64, void
 from numba.core.types.npytypes import NumPyRandomGeneratorType
 from numpy.typing import NDArray
 
@@ -247,7 +248,7 @@ def clip(value: float, low: float, high: float) -> float:
 
 def _check_function(name: str, function: object) -> None:
     allowed = f"a plain function of {_ARGUMENTS[name]}"
-    arguments = inspect.signature(instance(name, function, PlainFunction, allowed)).parameters
+    arguments = inspect.signature(instance(name, function, FunctionType, allowed)).parameters
     wanted = len(_SIGNATURES[name].args)
     require(len(arguments) == wanted, name, f"({', '.join(arguments)})", allowed)
 
@@ -258,9 +259,21 @@ class _FirstClass(CPUDispatcher):
     `numba.cfunc` makes such functions too, but an exception in one of those is printed and lost.
     """
 
-    @property
-    def _numba_type_(self) -> Any:
-        return FunctionType(self.nopython_signatures[0])
+    _numba_type_: Any = None
+
+    def compile_only(self, signature: Any) -> None:
+        """Compile for the one signature that there will be."""
+        self.compile(signature)
+        self.disable_compile()
+        # Numba asks anew at every call of a loop: keep what takes long to find.
+        result: Any = next(iter(self.overloads.values()))
+        address = cache(result.library.get_pointer_to_function)
+        self._result = result._replace(library=SimpleNamespace(get_pointer_to_function=address))
+        self._numba_type_ = types.FunctionType(signature)
+
+    def get_compile_result(self, signature: Any) -> Any:
+        """Return where the machine code is."""
+        return self._result
 
 
 @cache
@@ -273,7 +286,7 @@ def _first_class(name: str, function: Callable[..., Any]) -> Any:
         kept: Any = compiled(function)
         made._cache = kept._cache
     try:
-        made.compile(signature)
+        made.compile_only(signature)
     except Exception as error:  # numba has many
         told = re.sub(r"^Failed in .*?\) ", "", " ".join(str(error).split()))
         reason = re.split(r" (?:During:|File|There are) ", told)[0]
@@ -281,5 +294,4 @@ def _first_class(name: str, function: Callable[..., Any]) -> Any:
             f"{name} must be a function of {_ARGUMENTS[name]} that numba compiles, "
             f"got {function.__module__}.{function.__qualname__}: {reason}"
         ) from error
-    made.disable_compile()
     return made
