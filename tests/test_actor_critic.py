@@ -34,7 +34,7 @@ class Bandit(gymnasium.Env):
 
     def step(self, action):
         """Pay and end."""
-        return np.zeros(2, np.float32), float(action == self.state), True, False, {}
+        return np.ones(2, np.float32), float(action == self.state), True, False, {}
 
 
 def test_it_is_a_file_of_at_most_a_hundred_lines():

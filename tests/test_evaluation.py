@@ -6,7 +6,6 @@ import pytest
 import torch
 
 from rl_core import modules
-from rl_core.dqn import DQNConfig, dqn
 from rl_core.evaluation import (
     Agent,
     action_values,
@@ -267,15 +266,11 @@ def test_trained_weights_do_better_than_the_first(acrobot):
     assert len(set(median.values())) == 3
 
 
-def trained_values(name):
-    config = DQNConfig(batch_size=16, learning_starts=50, max_episode_steps=300)
-    return weights_of(dqn(name, config, episodes=2, seeds=[0]).arrays, 0)
-
-
 @pytest.mark.parametrize("epsilon", [0.0, 0.3])
 def test_compiled_and_plain_episodes_of_a_q_network_are_the_same(epsilon):
     name = "MountainCar-v0"
-    agent = of_values(trained_values(name), epsilon)
+    drawn = networks.xavier_uniform((2, 10, 3), np.random.default_rng(0))
+    agent = of_values(networks.unpack((2, 10, 3), drawn), epsilon)
     seen = [
         evaluate(env, agent, seed=1, episodes=3, max_steps=400)
         for env in (name, lambda: gymnasium.make(name, disable_env_checker=True).unwrapped)
