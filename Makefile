@@ -60,7 +60,7 @@ chapter: setup ## execute and build one chapter alone: make chapter N=3
 		$(filter book/0$(N)_% book/$(N)_%,$(NOTEBOOKS)))),$(error there is no chapter $(N)))
 
 lab: setup ## open the chapters in JupyterLab, with the Python of .venv
-	$(RUN) jupyter lab --ServerApp.root_dir=book --ServerApp.port=0 $(LAB)
+	$(RUN) python -m jupyterlab --ServerApp.root_dir=book --ServerApp.port=0 $(LAB)
 
 zip: book ## the site as one file, _build/book.zip, which opens without a network or a server
 	@$(STAMP) _build/.zip --in $(COMPLETE) -- python -m zipfile -c _build/book.zip $(SITE)
@@ -93,7 +93,7 @@ notebooks: setup ## every notebook at full scale (nbmake)
 	$(RUN) pytest --nbmake --nbmake-timeout=5400 -o faulthandler_timeout=0 --durations=0 $(NOTEBOOKS)
 
 browser: book ## the built book: claims, links; in a headless Chromium pictures, mathematics, films, search
-	$(RUN) pytest tests/built_book.py tests/browser.py
+	$(RUN) pytest tests/built_book.py tests/browser.py tests/interactive_browser.py
 
 hostile: setup ## a small book built among hostile settings has the same pictures and claims
 	$(RUN) pytest tests/hostile.py

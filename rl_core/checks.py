@@ -178,7 +178,8 @@ def integers(
     >>> integers("seeds", np.arange(3))
     (0, 1, 2)
     """
-    if not isinstance(values, Iterable) or isinstance(values, str | bytes):
+    scalar = isinstance(values, str | bytes) or (isinstance(values, np.ndarray) and not values.ndim)
+    if scalar or not isinstance(values, Iterable):
         _refuse(TypeError, name, values, f"a sequence of integers from {least}")
     return tuple(integer(name, value, least, most) for value in values)
 

@@ -423,6 +423,18 @@ def test_the_caption_speaks_of_headings_where_there_are_some(view):
     assert shown == [view.page.viewport_size["width"] > 700] * 2
 
 
+def test_a_claim_takes_one_line_on_a_desk_and_three_on_a_phone(view):
+    """Except where the verdict depends on the reading, and both numbers are shown."""
+    view.go("book/intro.html")
+    wide = view.page.viewport_size["width"] > 700
+    rows = view.page.locator("table.claims tbody tr:not(:has(.readings))")
+    heights = rows.evaluate_all("rows => rows.map(row => row.getBoundingClientRect().height)")
+    assert max(heights) < (30 if wide else 70)
+    first = rows.first.locator("details")
+    first.locator("summary").press("Enter")
+    assert first.get_by_text("Decides: ").is_visible()
+
+
 DARK = "() => matchMedia('(prefers-color-scheme: dark)').matches"
 
 

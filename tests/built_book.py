@@ -16,7 +16,10 @@ ROOT = Path(__file__).parent.parent
 SITE = ROOT / "_build/html"
 PAGES = sorted(SITE.glob("book/*.html"))
 CHAPTERS = [page for page in PAGES if page.stem[:2].isdecimal()]
-VERDICTS = ("holds", "holds in part", "does not hold", "cannot tell")
+VERDICTS = (
+    *("holds", "holds in part", "does not hold", "cannot tell"),
+    "depends on the reading",
+)
 
 
 @cache

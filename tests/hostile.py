@@ -90,3 +90,20 @@ def test_the_pictures_are_the_same(built):
     pages = (folder / "_build/chapter/_build/html/_images" for folder in built)
     one, other = ({path.name: path.read_bytes() for path in page.iterdir()} for page in pages)
     assert one == other
+
+
+def test_plain_sphinx_builds_the_same_sources(tmp_path):
+    """The exit, should Jupyter Book 1.x go away; see CONTRIBUTING."""
+    source = checkout(tmp_path / "book")
+    (source / "_toc.yml").write_text("format: jb-book\nroot: book/references\n")
+    clean = [source / ".venv/bin/python", "book/web/isolation.py", "jupyter-book"]
+    subprocess.check_call([*clean, "config", "sphinx", "."], cwd=source)
+    conf = source / "conf.py"
+    without = conf.read_text().replace("'jupyter_book', ", "")
+    own = "import sys; sys.path.insert(0, 'book')\n"
+    conf.write_text(own + without.replace("'sphinx_jupyterbook_latex', ", ""))
+    clean[2:] = ["python", "-m", "sphinx", "-q", "-b", "html"]
+    subprocess.check_call([*clean, ".", "_build/html"], cwd=source)
+    page = (source / "_build/html/book/references.html").read_text()
+    assert "Sutton" in page
+    assert "book.css" in page

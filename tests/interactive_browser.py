@@ -33,10 +33,10 @@ from interactive import (  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from playwright.sync_api import Browser, Locator, Page  # noqa: E402
 
+from drawings.look import Film  # noqa: E402
+from drawings.maze import situation_figure  # noqa: E402
 from rl_core.exploration import EpsilonGreedy  # noqa: E402
-from rl_core.figures import Film  # noqa: E402
 from rl_core.maze import ACTIONS, CLOCKWISE, Maze  # noqa: E402
-from rl_core.maze_figures import situation_figure  # noqa: E402
 from rl_core.planning import (  # noqa: E402
     backup,
     optimal_actions,

@@ -21,24 +21,47 @@ from rl_core import evaluation, exploration, mdp, planning, policies, statistics
 from rl_core.dqn import DQNConfig, dqn
 from rl_core.experiments import Arm, run
 from rl_core.maze import Maze, random_maze
-from rl_core.policies import MLP, Gaussian, Module
+from rl_core.policies import MLP, Gaussian
 from rl_core.q_learning import QLearningConfig, q_learning, q_learning_on_model
 from rl_core.reinforce import ReinforceConfig, reinforce
 from rl_core.worlds import discretise, environments, names, tasks
 from rl_core.worlds.shaping import Shaping
 
-SECONDS = 5  # a call that takes longer hangs
+SECONDS = 20  # a call that takes longer hangs; some compile
 NAMELESS = 0.01  # share of refusals that need not name the argument
 
 ODD = [
     *(None, True, False, np.True_, -1, 0, 1, 2, 3, 7, 2**31, 2**63 - 1, 2**63, -(2**70), 10**400),
     *(0.0, -0.0, 0.5, 1.0, 1.5, -0.5, 1e-300, 1e308, float("nan"), float("inf"), float("-inf")),
     *(np.uint8(200), np.int8(-1), np.int64(3), np.float16(0.5), np.float32("nan"), np.float64(2)),
-    *(Fraction(1, 2), Decimal("0.5"), 1 + 2j, "", "x", "x:y", "nowhere:Foo-v0", "CartPole-v1", b"x"),
-    *((), (1,), (0, 0), [], [1, 2], [[1], [1, 2]], {}, {"a": 1}, {1}, range(0), range(3), iter([0])),
+    *(
+        Fraction(1, 2),
+        Decimal("0.5"),
+        1 + 2j,
+        "",
+        "x",
+        "x:y",
+        "nowhere:Foo-v0",
+        "CartPole-v1",
+        b"x",
+    ),
+    *(
+        (),
+        (1,),
+        (0, 0),
+        [],
+        [1, 2],
+        [[1], [1, 2]],
+        {},
+        {"a": 1},
+        {1},
+        range(0),
+        range(3),
+        iter([0]),
+    ),
     *(np.array([]), np.array(3), np.zeros(2), np.zeros((2, 2)), np.array(["x"]), np.array([None])),
     *(np.full(3, np.nan), np.array([np.inf, -np.inf]), pd.DataFrame(), pd.Series([1.0, 2.0])),
-    *(object(), int, len, lambda: None, MLP(), np.random.default_rng(0), spaces.Discrete(2)),
+    *(object(), int, len, MLP(), np.random.default_rng(0), spaces.Discrete(2)),
 ]
 
 
@@ -52,7 +75,9 @@ WEIGHTS = {"layer0.weight": np.zeros((2, 3), np.float32)}
 CONTINUOUS = {"layer0.weight": np.zeros((2, 1), np.float32), "log_sigma": np.zeros(1, np.float32)}
 LINEAR = ReinforceConfig(network=MLP(()), max_episode_steps=9)
 DIRECT = ReinforceConfig(network=MLP(()), policy=Gaussian(mean="direct"))
-SMALL = DQNConfig(network=MLP(()), batch_size=4, memory_size=9, learning_starts=4, max_episode_steps=9)
+SMALL = DQNConfig(
+    network=MLP(()), batch_size=4, memory_size=9, learning_starts=4, max_episode_steps=9
+)
 TABULAR = QLearningConfig(max_steps=9)
 BOX = spaces.Box(-1, 1, (2,))
 GRIDDED = discretise.gridded("MountainCar-v0", 3)
@@ -73,7 +98,7 @@ CALLS: list[tuple[Callable, dict]] = [
     (random_maze, {"rows": 4, "columns": 4, "flags": 1, "wall_fraction": 0.1, "rng": rng()}),
     (policies.MLP, {"hidden": (3,), "biases": True}),
     (policies.Module, {"function": "torch.nn:Linear"}),
-    (policies.Gaussian, {field.name: getattr(Gaussian(), field.name) for field in fields(Gaussian)}),
+    (policies.Gaussian, {f.name: getattr(Gaussian(), f.name) for f in fields(Gaussian)}),
     (ReinforceConfig, {f.name: getattr(LINEAR, f.name) for f in fields(LINEAR)}),
     (DQNConfig, {f.name: getattr(SMALL, f.name) for f in fields(SMALL)}),
     (QLearningConfig, {f.name: getattr(TABULAR, f.name) for f in fields(TABULAR)}),
@@ -173,6 +198,8 @@ def test_every_odd_argument_is_taken_or_refused_by_name(tmp_path, monkeypatch):
             for odd in ODD:
                 if name in WORK and isinstance(odd, int) and 2**31 <= odd < 2**63:
                     continue  # allowed, and a long day's work
+                if name == "progress" and callable(odd):
+                    continue  # allowed; what it raises is its own
                 found = outcome(function, {**valid, name: odd}, name)
                 tried += 1
                 told = f"{function.__qualname__}({name}={odd!r}): {found}"

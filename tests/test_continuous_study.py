@@ -5,9 +5,9 @@ import pandas as pd
 import pytest
 
 from drawings import continuous as drawings
-from rl_core.policies import Gaussian
+from rl_core.evaluation import mean_actions
+from rl_core.policies import MLP, Gaussian
 from rl_core.reinforce import ReinforceConfig
-from rl_core.rollouts import mean_actions
 from studies import continuous as study
 from studies import continuous_fates as what_became
 
@@ -157,7 +157,7 @@ def test_arms_are_the_reports_with_one_thing_changed():
     arms = {arm.name: arm for arm in study.arms()}
     reported = arms["as reported"].config
     assert reported.policy == Gaussian(mean="weights", sigma=0.3)
-    assert (reported.hidden, reported.biases, reported.learning_rate) == ((10, 20), False, 2e-3)
+    assert (reported.network, reported.learning_rate) == (MLP((10, 20), biases=False), 2e-3)
     assert (reported.batch_size, reported.epochs, reported.gamma) == (512, 1, 0.99)
     assert reported.normalise == "centre"
     assert len({repr(arm.config) for arm in arms.values()}) == len(arms)
@@ -170,7 +170,7 @@ def test_without_constant_and_biases_the_mean_grows_with_the_square_of_the_state
         for i, shape in enumerate([(2, 10), (10, 20), (20, 2)])
     }
     weights["log_sigma"] = np.zeros(1, np.float32)
-    config = ReinforceConfig(biases=False, policy=Gaussian(mean="weights"))
+    config = ReinforceConfig(network=MLP(biases=False), policy=Gaussian(mean="weights"))
     states = rng.normal(size=(20, 2))
     small, large = (mean_actions(config, weights, c * states) for c in (1.0, 3.0))
     np.testing.assert_allclose(large, 9 * small, rtol=1e-4, atol=1e-5)

@@ -160,5 +160,5 @@ def test_the_share_of_random_steps_is_that_of_the_actions_taken():
 
 def test_the_criteria_cover_the_claims_of_section_3_2():
     assert [claim.id for claim in study.CLAIMS] == ["3f", "3g", "3h", "3i", "3j", "3k", "3l"]
-    with pytest.raises(ValueError, match=r"^evidence must be 2 pieces, one for each criterion"):
+    with pytest.raises(ValueError, match="evidence must be 2 pieces"):
         study.CLAIMS[0].judge()

@@ -3,21 +3,30 @@
 import gymnasium
 import numpy as np
 import pytest
+import torch
 
+from rl_core import modules
+from rl_core.dqn import DQNConfig, dqn
 from rl_core.evaluation import (
     Agent,
+    action_values,
     as_learned,
     evaluate,
     evaluate_table,
     evaluation_streams,
     greedy,
+    mean_actions,
     of_values,
+    rollout,
+    state_grid,
     uniform,
 )
-from rl_core.policies import Gaussian, Policy
-from rl_core.reinforce import ReinforceConfig
-from rl_core.tabular import spawn_streams
-from rl_core.worlds.discretise import Discretised, binned
+from rl_core.kernels import networks
+from rl_core.kernels.likelihood import Policy
+from rl_core.policies import MLP, Gaussian, Module
+from rl_core.reinforce import ReinforceConfig, reinforce
+from rl_core.training import spawn_streams, weights_of
+from rl_core.worlds.discretise import Discretised, gridded
 
 PUMP = {"layer0.weight": np.array([[1e-7, 0, -1e-7], [-1, 0, 1]], np.float32)}
 """Push the way the car moves, and to the right from rest: Q(s, a) = (a - 1) (v - 1e-7 x)."""
@@ -68,7 +77,7 @@ def test_starts_are_the_same_for_every_agent():
 
 def test_a_table_is_evaluated_from_the_starts_of_the_networks():
     """A grid that tells left from right in velocity only holds the same policy as the network."""
-    world = binned("MountainCar-v0", (1, 2))
+    world = gridded("MountainCar-v0", (1, 2))
     Q = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     found = evaluate_table(world, Q, seed=3, episodes=10, max_steps=10_000)
     network = evaluate("MountainCar-v0", of_values(PUMP), seed=3, episodes=10, max_steps=10_000)
@@ -89,7 +98,8 @@ def test_evaluation_draws_from_streams_that_no_learner_uses():
         np.random.default_rng(evaluation_streams(7)[0]).random(),
         evaluation_streams(7)[1].random(),
     ]
-    learners = [stream.random() for streams in spawn_streams(7, 2) for stream in streams]
+    learners = [stream.random() for stream in spawn_streams(7)[1:]]
+    learners.append(np.random.default_rng(spawn_streams(7).environment_seed).random())
     assert not set(own) & set(learners)
 
 
@@ -124,7 +134,7 @@ def test_greedy_is_the_mode_of_the_policy():
 
 
 def test_greedy_gaussian_acts_by_its_mean():
-    config = ReinforceConfig(hidden=(), policy=Gaussian(mean="direct"))
+    config = ReinforceConfig(network=MLP(()), policy=Gaussian(mean="direct"))
     weights = {"layer0.weight": np.array([[0], [20]], np.float32), "log_sigma": np.zeros(1)}
     agent = as_learned(config, {k: v.astype(np.float32) for k, v in weights.items()})
 
@@ -147,11 +157,11 @@ def test_any_other_environment():
 
 
 def test_under_a_limit_the_same_episodes_are_cut():
-    world = binned("MountainCarContinuous-v0", (1, 2), levels=3)
+    world = gridded("MountainCarContinuous-v0", (1, 2), levels=3)
     Q = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     network = {"layer0.weight": np.array([[0], [50]]), "log_sigma": np.array([-3])}
     agent = as_learned(
-        ReinforceConfig(hidden=(), policy=Gaussian(mean="direct")),
+        ReinforceConfig(network=MLP(()), policy=Gaussian(mean="direct")),
         {name: array.astype(np.float32) for name, array in network.items()},
     )
     for play in (
@@ -175,19 +185,19 @@ def test_bad_arguments():
     agent = uniform(2, 3)
     for bad in ({"seed": -1}, {"episodes": 0}, {"max_steps": 0.5}, {"limit": 6}):
         arguments = {"seed": 0, "episodes": 1, "max_steps": 5} | bad
-        with pytest.raises(ValueError, match=next(iter(bad))):
+        with pytest.raises((TypeError, ValueError), match=f"^{next(iter(bad))} must be .*, got "):
             evaluate("MountainCar-v0", agent, **arguments)
-        world = binned("MountainCar-v0", 5)
-        with pytest.raises(ValueError, match=next(iter(bad))):
+        world = gridded("MountainCar-v0", 5)
+        with pytest.raises((TypeError, ValueError), match=f"^{next(iter(bad))} must be .*, got "):
             evaluate_table(world, np.zeros(world.shape), **arguments)
     with pytest.raises(ValueError, match="agent must be a network of 6 inputs"):
         evaluate("Acrobot-v1", agent, seed=0, episodes=1, max_steps=5)
-    with pytest.raises(ValueError, match="agent must be an Agent, got None"):
+    with pytest.raises(TypeError, match=r"^agent must be an Agent, got None"):
         evaluate("Acrobot-v1", None, seed=0, episodes=1, max_steps=5)
 
 
 GAUSSIAN = as_learned(
-    ReinforceConfig(hidden=(), policy=Gaussian(mean="direct")),
+    ReinforceConfig(network=MLP(()), policy=Gaussian(mean="direct")),
     {"layer0.weight": np.zeros((2, 1), np.float32), "log_sigma": np.zeros(1, np.float32)},
 )
 
@@ -210,21 +220,212 @@ def test_an_agent_that_does_not_fit_its_environment_is_refused(env, agent, messa
 @pytest.mark.parametrize(
     ("Q", "message"),
     [
-        (np.zeros((24, 3)), r"of shape \(25, 3\), got \(24, 3\)"),
-        ([[0.0] * 3] * 25, "an array of numbers"),
-        (np.full((25, 3), "a"), "an array of numbers"),
-        (np.where(np.arange(75) == 7, np.nan, 0).reshape(25, 3), "without NaN, got '1 of them'"),
+        (np.zeros((24, 3)), r"an array of numbers of shape \(25, 3\), got \(24, 3\)"),
+        ([[0.0] * 3, [0.0]], r"an array of numbers of shape \(25, 3\), got "),
+        (np.full((25, 3), "a"), r"an array of numbers of shape \(25, 3\), got "),
+        (np.where(np.arange(75) == 7, np.nan, 0).reshape(25, 3), r"without NaN, at \(2, 1\) it is"),
     ],
 )
 def test_a_table_of_something_else_is_refused(Q, message):
-    world = binned("MountainCar-v0", 5)
-    with pytest.raises(ValueError, match=f"^Q must be {message}"):
+    world = gridded("MountainCar-v0", 5)
+    with pytest.raises((TypeError, ValueError), match=f"^Q must be {message}"):
         evaluate_table(world, Q, seed=0, episodes=1, max_steps=5)
 
 
 @pytest.mark.parametrize("measures", [{"steps": max}, {"limited_return": max}, {"a": 3}, [max]])
 def test_measures_do_not_take_the_place_of_a_column(measures):
-    with pytest.raises(ValueError, match=r"^measures must be "):
+    with pytest.raises(ValueError, match=r"^measures must be .*, got "):
         evaluate(
             "MountainCar-v0", uniform(2, 3), seed=0, episodes=1, max_steps=5, measures=measures
         )
+
+
+# Agents of trained weights
+
+
+CONTINUOUS = ReinforceConfig(
+    network=MLP(biases=False),
+    policy=Gaussian(sigma=0.5, constant_feature=True),
+    max_episode_steps=300,
+)
+
+
+@pytest.fixture(scope="module")
+def acrobot():
+    config = ReinforceConfig(max_episode_steps=5000)
+    return config, reinforce("Acrobot-v1", config, episodes=300, seeds=[0], snapshots=(100,))
+
+
+def test_trained_weights_do_better_than_the_first(acrobot):
+    config, run = acrobot
+    median = {}
+    for moment in ("initial/", "episode100/", ""):
+        agent = as_learned(config, weights_of(run.arrays, 0, moment))
+        played = evaluate("Acrobot-v1", agent, seed=0, episodes=15, max_steps=3000)
+        median[moment] = played["steps"].median()
+    assert median[""] < median["initial/"] / 2
+    assert len(set(median.values())) == 3
+
+
+def trained_values(name):
+    config = DQNConfig(batch_size=16, learning_starts=50, max_episode_steps=300)
+    return weights_of(dqn(name, config, episodes=2, seeds=[0]).arrays, 0)
+
+
+@pytest.mark.parametrize("epsilon", [0.0, 0.3])
+def test_compiled_and_plain_episodes_of_a_q_network_are_the_same(epsilon):
+    name = "MountainCar-v0"
+    agent = of_values(trained_values(name), epsilon)
+    seen = [
+        evaluate(env, agent, seed=1, episodes=3, max_steps=400)
+        for env in (name, lambda: gymnasium.make(name, disable_env_checker=True).unwrapped)
+    ]
+    assert seen[0].equals(seen[1])
+
+
+def test_an_epsilon_greedy_agent_explores_that_share():
+    agent = of_values(PUMP, 0.3)
+
+    def explored(observations, actions, rewards):
+        best = action_values(PUMP, observations[:-1]).argmax(axis=1)
+        return float((best != actions[:, 0]).sum())
+
+    table = evaluate(
+        "MountainCar-v0", agent, seed=0, episodes=40, max_steps=999, measures={"n": explored}
+    )
+    n = table["steps"].sum()
+    assert table["n"].sum() / n == pytest.approx(0.2, abs=4 * np.sqrt(0.16 / n))
+    for epsilon in (1.5, np.nan, -0.1):
+        with pytest.raises(ValueError, match=r"^epsilon must be a number from 0 to 1, got "):
+            of_values(PUMP, epsilon)
+
+
+def test_an_agent_of_a_module_is_refused_by_name():
+    config = ReinforceConfig(network=Module("toy_networks:make"))
+    with pytest.raises(ValueError, match=r"^network must be an MLP\(\.\.\.\), got Module"):
+        as_learned(config, {"body.weight": np.zeros((8, 2))})
+
+
+def test_weights_that_do_not_go_with_the_configuration_are_refused():
+    with pytest.raises(TypeError, match=r"^config must be a ReinforceConfig, got None"):
+        as_learned(None, PUMP)
+    with pytest.raises(TypeError, match=r"^weights must be a mapping of names to arrays, got None"):
+        as_learned(CONTINUOUS, None)
+    with pytest.raises(ValueError, match=r"^weights must be with 'log_sigma', .*, got \['layer0"):
+        as_learned(CONTINUOUS, PUMP)
+    with pytest.raises(ValueError, match=r"^layers must hold 'layer0\.weight'"):
+        as_learned(ReinforceConfig(), {})
+
+
+# Whole episodes
+
+
+@pytest.mark.parametrize("name", ["Acrobot-v1", "MountainCarContinuous-v0"])
+def test_gymnasium_plays_a_rollout_again(name):
+    config = CONTINUOUS if "Continuous" in name else ReinforceConfig(max_episode_steps=50)
+    run = reinforce(name, config, episodes=1, seeds=[0])
+    agent = as_learned(config, weights_of(run.arrays, 0))
+    played = rollout(name, agent, np.random.default_rng(0), 150)
+    env = gymnasium.make(name, disable_env_checker=True).unwrapped
+    observation, _ = env.reset(seed=played.environment_seed)
+    np.testing.assert_array_equal(observation, played.observations[0])
+    for t, action in enumerate(played.actions):
+        native = int(action[0]) if name == "Acrobot-v1" else action
+        observation, reward, terminated, _, _ = env.step(native)
+        np.testing.assert_array_equal(observation, played.observations[t + 1])
+        assert reward == played.rewards[t]
+    assert terminated == played.terminated
+    assert len(played.observations) == len(played.actions) + 1
+
+
+def test_rollouts_are_a_function_of_the_generator():
+    first, again, other = (
+        rollout("Acrobot-v1", uniform(6, 3), np.random.default_rng(seed), 200) for seed in (0, 0, 1)
+    )
+    np.testing.assert_array_equal(first.observations, again.observations)
+    assert first.environment_seed != other.environment_seed
+    assert not np.array_equal(first.observations[0], other.observations[0])
+
+
+def test_rollouts_scatter_around_the_mean_action():
+    run = reinforce("MountainCarContinuous-v0", CONTINUOUS, episodes=1, seeds=[3])
+    weights = weights_of(run.arrays, 0)
+    agent = as_learned(CONTINUOUS, weights)
+    played = rollout("MountainCarContinuous-v0", agent, np.random.default_rng(0), 3000)
+    means = mean_actions(CONTINUOUS, weights, played.observations[:-1])
+    noise = (played.actions - means) / 0.5
+    assert abs(noise.mean()) < 4 / np.sqrt(len(noise))
+    assert noise.std() == pytest.approx(1, abs=4 / np.sqrt(2 * len(noise)))
+
+
+def test_a_rollout_refuses_what_does_not_fit():
+    rng = np.random.default_rng(0)
+    with pytest.raises(ValueError, match=r"^agent must be a network of 6 inputs, got \[2, 3\]"):
+        rollout("Acrobot-v1", uniform(2, 3), rng, 10)
+    with pytest.raises(TypeError, match=r"^rng must be a numpy\.random\.Generator, got None"):
+        rollout("MountainCar-v0", uniform(2, 3), None, 10)
+    with pytest.raises(TypeError, match=r"^agent must be an Agent, got "):
+        rollout("MountainCar-v0", PUMP, rng, 10)
+    with pytest.raises(ValueError, match=r"^max_steps must be an integer from 1, got 0"):
+        rollout("MountainCar-v0", uniform(2, 3), rng, 0)
+
+
+# Policies and values as functions of the state
+
+
+def test_values_are_those_of_the_same_network_in_torch():
+    rng = np.random.default_rng(0)
+    parameters = networks.xavier_uniform((6, 10, 20, 3), rng)
+    weights = networks.unpack((6, 10, 20, 3), parameters)
+    observations = rng.normal(size=(50, 6)).astype(np.float32)
+    module = modules.perceptron((6, 10, 20, 3), parameters)
+    expected = module(torch.from_numpy(observations)).detach().numpy()
+    np.testing.assert_allclose(action_values(weights, observations), expected, atol=1e-5)
+
+
+@pytest.mark.parametrize("shape", [(2,), (5, 1), (5, 3), (1, 5, 2)])
+def test_observations_of_another_width_are_refused_not_broadcast(shape):
+    with pytest.raises(ValueError, match=r"^observations must be .*\(any, 2\), got "):
+        action_values(PUMP, np.ones(shape))
+
+
+@pytest.mark.parametrize("mean", ["weights", "direct"])
+@pytest.mark.parametrize("constant", [True, False])
+def test_mean_actions_by_hand(mean, constant):
+    policy = Gaussian(mean=mean, constant_feature=constant)
+    config = ReinforceConfig(network=MLP((), biases=False), policy=policy)
+    observations = np.array([[2.0, -1.0], [0.5, 3.0]])
+    features = np.column_stack([observations, np.ones(2)]) if constant else observations
+    n = features.shape[1]
+    matrix = np.arange(1.0, 1 + n * (n if mean == "weights" else 1)).reshape(n, -1)
+    outputs = features @ matrix
+    expected = outputs if mean == "direct" else (outputs * features).sum(axis=1, keepdims=True)
+    weights = {"layer0.weight": matrix.astype(np.float32), "log_sigma": np.zeros(1, np.float32)}
+    found = mean_actions(config, weights, observations)
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+
+
+def test_a_policy_without_a_mean_has_none():
+    with pytest.raises(ValueError, match=r"^policy must be Gaussian\(\.\.\.\), got Categorical"):
+        mean_actions(ReinforceConfig(), PUMP, np.ones((1, 2)))
+
+
+def test_a_grid_covers_the_space_of_observations():
+    space = gymnasium.make("MountainCarContinuous-v0").observation_space
+    grid = state_grid(space, 7)
+    assert grid.shape == (49, 2)
+    np.testing.assert_array_equal(grid.min(axis=0), space.low)
+    np.testing.assert_array_equal(grid.max(axis=0), space.high)
+    np.testing.assert_allclose(grid.reshape(7, 7, 2)[3, 3], (space.low + space.high) / 2, atol=1e-7)
+    assert len(np.unique(grid, axis=0)) == 49
+
+
+def test_a_grid_without_end_is_refused():
+    endless = gymnasium.make("CartPole-v1").observation_space.low.copy()
+    endless[1] = -np.inf
+    with pytest.raises(ValueError, match=r"^space must be a Box with finite bounds.*, got Box"):
+        state_grid(gymnasium.spaces.Box(endless, 5.0), 3)
+    with pytest.raises(ValueError, match=r"^space must be a Box of one axis, got Discrete"):
+        state_grid(gymnasium.spaces.Discrete(3), 3)
+    with pytest.raises(ValueError, match=r"^points must be an integer from 2, got 1"):
+        state_grid(gymnasium.spaces.Box(-1.0, 1.0, (2,)), 1)

@@ -27,8 +27,8 @@ import rl_core
 from rl_core.dqn import DQNConfig, dqn
 from rl_core.experiments import Arm, DamagedResultWarning, provenance, run, runner
 from rl_core.experiments.store import ARRAYS, RECORD, TABLE, Store
-from rl_core.grid_learning import GridConfig, q_learning_on_grid
-from rl_core.policies import Gaussian
+from rl_core.policies import MLP, Gaussian
+from rl_core.q_learning import QLearningConfig, q_learning
 from rl_core.reinforce import ReinforceConfig, reinforce
 from rl_core.worlds.names import Make
 
@@ -44,7 +44,7 @@ CAR = Arm(
     "MountainCarContinuous-v0",
     ReinforceConfig(
         policy=Gaussian(learn_sigma=True, constant_feature=True),
-        biases=False,
+        network=MLP(biases=False),
         epochs=1,
         normalise="centre",
         max_episode_steps=700,
@@ -616,7 +616,7 @@ def test_run_refuses(tmp_path, change, error, message):
             "env must have a Discrete action space",
         ),
         (
-            {"algorithm": q_learning_on_grid, "config": GridConfig(bins=(5, 5))},
+            {"algorithm": q_learning, "config": QLearningConfig(bins=(5, 5))},
             r"bins must be a positive integer, or 6 of them, got \(5, 5\)",
         ),
     ],

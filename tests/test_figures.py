@@ -1,11 +1,16 @@
 """The shared pieces of the drawings."""
 
+import os
+import re
 import subprocess
+import sys
 
 import imageio_ffmpeg
+import nbformat
 import numpy as np
 import pandas as pd
 import pytest
+from nbclient import NotebookClient
 
 from drawings.look import Film
 from report.captions import captioned
@@ -46,14 +51,15 @@ def test_a_film_describes_itself_and_does_not_start_by_itself():
 @pytest.mark.parametrize(
     ("frames", "speed", "message"),
     [
-        ([], 1, "frames is empty"),
-        ([np.zeros((32, 32, 3), np.uint8)], 0, "frames_per_second must be positive, not 0"),
-        ([np.zeros((32, 32, 3))], 1, "frame 0 must be uint8"),
-        ([np.zeros((32, 32, 4), np.uint8)], 1, "frame 0 must be uint8"),
+        ([], 1, "frames must be one frame or more"),
+        ([np.zeros((32, 32, 3), np.uint8)], 0, "frames_per_second must be .* above 0, got 0"),
+        ([np.zeros((32, 32, 3), np.uint8)], np.nan, "frames_per_second must be .*, got nan"),
+        ([np.zeros((32, 32, 3))], 1, r"frames\[0\] must be uint8"),
+        ([np.zeros((32, 32, 4), np.uint8)], 1, r"frames\[0\] must be uint8"),
         (
             [np.zeros((32, 32, 3), np.uint8), np.zeros((32, 34, 3), np.uint8)],
             1,
-            "frame 1 has shape",
+            r"frames\[1\] must be of the shape of the first, \(32, 32, 3\), got \(32, 34, 3\)",
         ),
     ],
 )
@@ -79,3 +85,48 @@ def test_the_same_table_gives_the_same_page():
 def test_a_table_has_an_address():
     page = captioned(pd.DataFrame({"a": [1.0]}), "Table 3.1. Steps. All of them.").to_html()
     assert '<table id="T_table-3-1">' in page
+
+
+HOSTILE = '<script>alert("1")</script>&'
+
+
+def test_what_a_user_names_is_text_in_a_table():
+    table = pd.DataFrame({"arm": [HOSTILE], f"steps {HOSTILE}": [1.0]})
+    page = captioned(table, f"Table {HOSTILE}. {HOSTILE}").to_html()
+    assert "<script" not in page
+    assert page.count("&lt;script&gt;") == 4  # twice in the caption
+    assert re.findall(r'id="([^"]*)"', page)[0] == "T_table-script-alert-1-script"
+    # and in a column that has a format of its own
+    assert "<script" not in captioned(table, "Table 0.", formats={"arm": "{:>20}"}).to_html()
+
+
+STYLE = """
+import sys
+sys.path[:0] = ["book", "."]
+import matplotlib as mpl
+from drawings.look import use_style
+use_style()
+print(mpl.rcParams["text.usetex"], mpl.rcParams["figure.dpi"], mpl.rcParams["xtick.labelsize"])
+"""
+
+
+def test_a_readers_own_settings_do_not_leak_in(tmp_path):
+    own = tmp_path / "matplotlibrc"
+    own.write_text("text.usetex: True\nxtick.labelsize: 40\nfigure.dpi: 30\n")
+    environment = os.environ | {"MATPLOTLIBRC": str(own)}
+    command = [sys.executable, "-c", STYLE]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "100.0", "medium"]
+
+
+@pytest.mark.parametrize("backend", ["Agg", "svg", "module://nowhere"])
+def test_a_notebook_shows_its_figures_whatever_the_backend(tmp_path, monkeypatch, backend):
+    (tmp_path / "matplotlibrc").write_text("text.usetex: True\n")
+    monkeypatch.setenv("MATPLOTLIBRC", str(tmp_path / "matplotlibrc"))
+    monkeypatch.setenv("MPLBACKEND", backend)
+    draw = "from matplotlib import pyplot as plt\nplt.plot([1, 2])"
+    cells = [nbformat.v4.new_code_cell(source) for source in (STYLE, draw)]
+    notebook = nbformat.v4.new_notebook(cells=cells)
+    NotebookClient(notebook, timeout=120, kernel_name="python3").execute()
+    shown = [output.get("data", {}) for output in notebook.cells[1].outputs]
+    assert sum("image/png" in data for data in shown) == 1

@@ -21,10 +21,19 @@ FOUND = pd.DataFrame(
         "high": [np.inf, 1.0, 0.75],
         "seeds": [30, 0, 30],
         "verdict": ["does not hold", "holds", "cannot tell"],
-        "figure": ["Figure 11, S3.2", "Figures 1 to 8, Table 1.1", "S2.6"],
+        "figure": ["Figure 11, S3.2", "Figures 1 to 8, Table 1.1", "Figure S2.6"],
+        "deciding_criterion": ["the same again", "share is 1", "ratio"],
+        "deciding_estimate": [299.5, 1.0, 0.5],
+        "deciding_low": [-np.inf, 1.0, 0.25],
+        "deciding_high": [np.inf, 1.0, 0.75],
+        "deciding_seeds": [26, 0, 30],
+        "deciding_bound": [225.0, 1.0, 0.5],
+        "distance": [-74.5, 0.0, 0.0],
+        "readings": [np.nan] * 3,  # as an empty text is read from a file
+        "amended": ["on seeds 100 to 129", np.nan, np.nan],
+        "chapter": [3, 1, 2],
     }
 )
-FOUND.loc[2, "figure"] = "Figure S2.6"
 
 
 def test_the_claims_come_in_the_order_of_the_report(tmp_path):
@@ -59,18 +68,44 @@ def test_what_failed_stands_first():
     assert front_page.counts(FOUND) == {
         "does not hold": 1,
         "holds in part": 0,
+        "depends on the reading": 0,
         "cannot tell": 1,
         "holds": 1,
     }
 
 
-def test_a_row_tells_its_interval_and_escapes_its_text():
+def test_a_row_shows_the_number_that_decides():
+    """And not the first, which is that of another criterion."""
     page = front_page.claims_table(FOUND)
-    assert "<b>314</b> <small>[250, ∞]</small>" in page
+    assert "<b>300</b> <small>[−∞, ∞]</small>" in page
+    assert "314" not in page
     assert "<b>1</b></td>" in page  # exact: no interval
+    assert "the same again: 300 [−∞, ∞] (26 seeds), bound 225, missed by 74.5." in page
+    assert "share is 1: 1 (exact), bound 1, kept by 0." in page
+    assert "<p>Criteria: steps at most 225; the same again.</p>" in page
+    assert page.count("Criteria:") == 1  # where there is only one it is the one that decides
+    assert "<p>Amended: on seeds 100 to 129.</p>" in page
+    assert "nan" not in page.lower()
     assert '<span class="sorts"> A click on a heading sorts.</span>' in page
-    assert "c &lt;third&gt;" in page
-    assert "<details><summary>and 1 more</summary><ul><li>the same again</li>" in page
+
+
+def test_both_numbers_are_shown_where_the_verdict_depends_on_the_reading():
+    text = "as round: does not hold, 8.15; as sweep: holds, 0.25"
+    row = FOUND[1:2].assign(verdict="depends on the reading", readings=text)
+    page = front_page.claims_table(row)
+    assert f'<div class="readings">{text}</div>' in page
+    assert '<span class="verdict depends-on-the-reading">depends on the reading</span>' in page
+    assert "<b>1</b> depends on the reading" in front_page.verdict_bar(row)
+
+
+def test_what_a_table_says_is_text():
+    assert "c &lt;third&gt;" in front_page.claims_table(FOUND)
+    hostile = '"><script>alert(1)</script>'
+    texts = ["id", "section", "claim", "criterion", "verdict", "deciding_criterion", "readings"]
+    table = FOUND.assign(**dict.fromkeys([*texts, "amended"], hostile))
+    table["figure"] = f"Figure 11, {hostile}"
+    for page in (front_page.claims_table(table), front_page.verdict_bar(table)):
+        assert "<script" not in page
 
 
 @pytest.mark.parametrize(

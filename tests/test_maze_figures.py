@@ -69,5 +69,20 @@ def test_the_film_has_every_move_and_marks_slips(maze):
 
 
 def test_a_film_needs_time_to_show_a_move(maze):
-    with pytest.raises(ValueError, match="frames_per_move must be at least 3, not 2"):
-        list(episode_frames(maze, [Move(0, 1, False, 8, 0.0)], frames_per_move=2))
+    with pytest.raises(ValueError, match="frames_per_move must be an integer from 3, got 2"):
+        episode_frames(maze, [Move(0, 1, False, 8, 0.0)], frames_per_move=2)
+    with pytest.raises(ValueError, match="moves must be one move or more"):
+        episode_frames(maze, [])
+
+
+def test_what_cannot_be_drawn_is_refused_by_name(maze):
+    with pytest.raises(ValueError, match=r"flags must be one of .*got 'D'"):
+        situation_figure(maze, np.zeros((112, 4)), "D")
+    with pytest.raises(ValueError, match=r"Q must be .*\(112, 4\), got \(16, 4\)"):
+        situation_figure(maze, np.zeros((16, 4)), "A")
+    with pytest.raises(ValueError, match="Q must be finite"):
+        situation_figure(maze, np.full((112, 4), np.nan), "A")
+    with pytest.raises(ValueError, match="policy must be of 112 actions, got 16"):
+        follow_policy(maze, np.zeros(16, int), seed=0)
+    with pytest.raises(ValueError, match="policy must be an integer from 0 to 3, got "):
+        follow_policy(maze, np.full(112, 4), seed=0)

@@ -68,7 +68,10 @@ def settings(path):
     names = re.findall(r"^from studies import (\w+) as study$", "\n".join(code), re.MULTILINE)
     own = [BOOK / "studies" / f"{name}.py" for name in names]
     code += [file.read_text() for file in own]
-    core = [ROOT / "rl_core" / f"{name}.py" for name in imported("\n".join(code))]
+    places = [ROOT / "rl_core" / name.replace(".", "/") for name in imported("\n".join(code))]
+    core = [
+        place / "__init__.py" if place.is_dir() else place.with_suffix(".py") for place in places
+    ]
     assert path in OTHERS or (own and core)
     trees = [ast.parse(source) for source in code]
     for file in core:
@@ -80,7 +83,7 @@ def settings(path):
 
 def imported(code):
     """The names of the modules of `rl_core` that code imports from."""
-    return re.findall(r"^(?:import|from) rl_core\.(\w+)(?! *\.)", code, re.MULTILINE)
+    return re.findall(r"^(?:import|from) rl_core\.([\w.]+)", code, re.MULTILINE)
 
 
 def reported():

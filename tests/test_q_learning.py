@@ -330,6 +330,17 @@ def test_any_environment_is_seen_through_a_grid():
     same_bits(run, q_learning("Pendulum-v1", config, episodes=2, seeds=[0]))
 
 
+def test_a_budget_stops_within_an_episode_on_a_grid_too():
+    whole = q_learning("MountainCar-v0", GRID, episodes=9, seeds=[0])
+    limited = dataclasses.replace(GRID, max_env_steps=2_000)
+    cut = q_learning("MountainCar-v0", limited, episodes=9, seeds=[0])
+    n = len(cut.table) - 1
+    assert n >= 1
+    assert cut.table["env_steps"].iloc[-1] == 2_000
+    assert not cut.table["terminated"].iloc[-1]
+    pd.testing.assert_frame_equal(cut.table[:n], whole.table[:n], check_exact=True)
+
+
 def test_a_task_s_time_limit_cuts_learning_and_trials():
     """A corridor of five cells with a limit of 100: one who only goes back never arrives."""
     rule = EpsilonGreedy(0.0)  # all values are 0 or below: the first steps try out, ties at random

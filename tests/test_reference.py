@@ -13,7 +13,11 @@ from web import docstrings
 
 PAGE = (Path(__file__).parent.parent / "book" / "api.md").read_text()
 LISTED = re.findall(r"^\.\. automodule:: (\S+)$", PAGE, re.MULTILINE)
-MODULES = [module.name for module in pkgutil.walk_packages(rl_core.__path__, "rl_core.")]
+MODULES = [
+    module.name
+    for module in pkgutil.walk_packages(rl_core.__path__, "rl_core.")
+    if not module.name.endswith("__main__")
+]
 
 
 def test_every_module_is_listed_once():

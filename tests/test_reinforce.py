@@ -14,19 +14,24 @@ from gymnasium import spaces
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rl_core import networks, policies, provenance, reinforce
-from rl_core.dynamics import TASKS
-from rl_core.episodes import Trajectory, open_environment, spawn_streams
-from rl_core.policies import Categorical, Gaussian, make_policy
-from rl_core.reinforce import ReinforceConfig, discounted_returns, normalised
-from rl_core.rollouts import mean_actions, weights_of
+from rl_core import modules, policies, reinforce
+from rl_core.episodes import Trajectory, play_episode
+from rl_core.evaluation import mean_actions
+from rl_core.experiments import Arm, run
+from rl_core.identity import describe
+from rl_core.kernels import likelihood, networks
+from rl_core.policies import MLP, Categorical, Gaussian, Module, make_policy
+from rl_core.reinforce import ReinforceConfig, TorchLearner, discounted_returns, normalised
+from rl_core.training import spawn_streams, weights_of
+from rl_core.worlds.environments import open_world
 
+TASKS = ("Acrobot-v1", "MountainCar-v0", "MountainCarContinuous-v0")
 CONFIGS = {
     "Acrobot-v1": ReinforceConfig(max_episode_steps=700),
     "MountainCar-v0": ReinforceConfig(max_episode_steps=1500),
     "MountainCarContinuous-v0": ReinforceConfig(
         policy=Gaussian(sigma=0.5, constant_feature=True),
-        biases=False,
+        network=MLP(biases=False),
         learning_rate=2e-3,
         epochs=1,
         normalise="centre",
@@ -220,7 +225,7 @@ def estimate(policy, parameters, observations, actions, rewards, weight=1.0):
     scratch = np.empty((2, policy.sizes.sum(), networks.padded(len(rewards))), np.float32)
     gradient = np.empty(parameters.size, np.float32)
     returns = (weight * discounted_returns(rewards, 1.0)).astype(np.float32)
-    policies.likelihood_gradient(
+    likelihood.likelihood_gradient(
         policy, parameters, observations, actions, returns, *scratch, gradient
     )
     return -gradient.astype(float)
@@ -242,114 +247,268 @@ def test_expected_estimate_is_the_exact_gradient():
 
 def test_sampled_estimates_average_to_the_exact_gradient():
     policy, parameters = chain_policy()
-    streams, environment = spawn_streams(0), open_environment(Chain)
-    environment.seed(streams.environment_seed)
+    streams, world = spawn_streams(0), open_world(Chain)
+    world.seed(streams.environment_seed)
+    actor = likelihood.make_actor(policy, parameters)
     trajectory = Trajectory(2, 1)
     estimates = []
     for _ in range(4000):
-        steps, _ = environment.play(policy, parameters, streams.policy, 100, trajectory)
+        steps, _ = play_episode(world, actor, streams.policy, 100, trajectory)
         estimates.append(estimate(policy, parameters, *trajectory.first(steps)))
     error = np.mean(estimates, axis=0) - exact_gradient(policy, parameters.astype(float))
     assert (np.abs(error) <= 4.5 * np.std(estimates, axis=0) / np.sqrt(4000) + 1e-6).all()
 
 
-@pytest.mark.parametrize("batch_size", [512, 300, 1000])
-def test_one_episode_of_learning_is_adam_on_the_stated_gradient(batch_size):
-    """The same weights from torch: autograd, Adam, minibatches in the order drawn."""
+# Two learners, one loop
+
+KINDS = {
+    "categorical": (Categorical(), 3, 0),
+    "weights, fixed sigma": (Gaussian(sigma=0.5, constant_feature=True), 0, 2),
+    "weights, learned sigma": (Gaussian(sigma=0.5, learn_sigma=True), 0, 1),
+    "direct, fixed sigma": (Gaussian(mean="direct", sigma=0.5), 0, 1),
+    "direct, learned sigma": (Gaussian(mean="direct", sigma=0.5, learn_sigma=True), 0, 2),
+}
+
+
+@pytest.fixture
+def one_thread():
+    """Threads of torch that wait for a core cost more than networks this small."""
+    with modules.reproducible():
+        yield
+
+
+class Learners:
+    """Both learners of one configuration, with the same weights, and a made-up episode."""
+
+    def __init__(self, kind, biases, hidden, steps=64):
+        distribution, n_actions, dimensions = KINDS[kind]
+        self.policy = make_policy(distribution, hidden, 4, n_actions, dimensions)
+        network = MLP(hidden, biases)
+        self.config = ReinforceConfig(network=network, policy=distribution, batch_size=steps)
+        rng = np.random.default_rng(0)
+        self.compiled = policies.initial_parameters(self.policy, distribution, rng)
+        self.mask = policies.trainable(self.policy, distribution, biases)
+        self.compiled_learner = likelihood.make_learner(
+            self.policy, self.compiled, self.mask, steps, self.config.learning_rate
+        )
+        self.torchs = self.compiled.copy()
+        sizes = self.policy.sizes.tolist()
+        self.module = modules.perceptron(sizes, self.torchs, biases)
+        start = torch.from_numpy(self.torchs)[networks.count_parameters(sizes) :]
+        learns = self.policy.gaussian and distribution.learn_sigma
+        self.log_sigma = torch.nn.Parameter(start, requires_grad=learns)
+        self.torch_learner = TorchLearner(self.policy, self.module, self.log_sigma, self.config)
+        width = self.policy.action_width
+        self.actions = (
+            rng.normal(size=(steps, width)) if dimensions else rng.integers(3, size=(steps, 1))
+        )
+        self.episode = (
+            rng.normal(size=(steps, 4)).astype(np.float32),
+            self.actions.astype(np.float32),
+            rng.normal(size=steps),
+            np.arange(steps)[None],
+        )
+
+    def compiled_gradient(self, parameters):
+        """By all parameters, of the loss that both descend."""
+        observations, actions, v, _ = self.episode
+        scratch = np.empty((2, self.policy.sizes.sum(), networks.padded(len(v))), np.float32)
+        gradient = np.empty_like(parameters)
+        weights = (v / len(v)).astype(np.float32)
+        likelihood.likelihood_gradient(
+            self.policy, parameters, observations, actions, weights, *scratch, gradient
+        )
+        return gradient * self.mask
+
+    def torch_gradient(self):
+        """Of the update just made; parameters that do not learn have none."""
+        parameters = [*self.module.parameters(), self.log_sigma]
+        zeros = (torch.zeros_like(p) if p.grad is None else p.grad for p in parameters)
+        return torch.cat([gradient.flatten() for gradient in zeros]).numpy()
+
+
+@pytest.mark.parametrize("hidden", [(7,), (7, 5)])
+@pytest.mark.parametrize("biases", [True, False])
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_update_is_the_same_compiled_and_in_torch(one_thread, kind, biases, hidden):
+    """To 1e-5 of the gradient's norm, and the parameters to 1e-4, which both walk on their own."""
+    both = Learners(kind, biases, hidden)
+    initial = both.compiled.copy()
+    for _ in range(50):
+        gradient = both.compiled_gradient(both.torchs)
+        both.torch_learner.learn(*both.episode)
+        likelihood.learn(both.compiled_learner, *both.episode)
+        norm = np.linalg.norm(gradient)
+        assert norm > 1e-3
+        assert np.linalg.norm(both.torch_gradient() - gradient) <= 1e-5 * norm
+        np.testing.assert_allclose(both.torchs, both.compiled, rtol=0, atol=1e-4)
+    moved = both.compiled != initial
+    assert not moved[both.mask == 0].any()
+    assert moved[both.mask == 1].mean() > 0.7  # a unit that is never on does not learn
+    np.testing.assert_array_equal(both.torchs != initial, moved)
+
+
+@pytest.mark.parametrize("kind", ["categorical", "weights, learned sigma", "direct, learned sigma"])
+def test_the_gradient_of_the_stated_loss_is_that_of_finite_differences(one_thread, kind):
+    both = Learners(kind, True, (7, 5))
+    both.module.double()
+    log_sigma = torch.nn.Parameter(both.log_sigma.detach().double())
+    learner = TorchLearner(both.policy, both.module, log_sigma, both.config)
+    tensors = [torch.from_numpy(array).double() for array in both.episode[:3]]
+    loss = learner.loss(*tensors)
+    loss.backward()
+    learned = [*both.module.parameters(), *([log_sigma] if log_sigma.numel() else [])]
+    for parameter in learned:
+        values, gradient = parameter.data.view(-1), parameter.grad.view(-1)
+        for i in range(len(values)):
+            around = []
+            for step in (1e-6, -1e-6):
+                values[i] += step
+                around.append(learner.loss(*tensors).item())
+                values[i] -= step
+            assert gradient[i].item() == pytest.approx((around[0] - around[1]) / 2e-6, abs=1e-7)
+
+
+def test_the_log_probability_is_torchs():
+    y, s = torch.randn(2, 6, 3, generator=torch.Generator().manual_seed(0))
+    taken = torch.tensor([[0.0], [2.0], [1.0], [1.0], [0.0], [2.0]])
+    found = reinforce.log_probability(make_policy(Categorical(), (), 3, 3, 0), y, s, taken, y)
+    expected = torch.distributions.Categorical(logits=y).log_prob(taken[:, 0])
+    torch.testing.assert_close(found, expected)
+    for mean, mu in [("direct", y), ("weights", (y * s).sum(1, keepdim=True))]:
+        policy = make_policy(Gaussian(mean=mean), (), 3, 0, mu.shape[1])
+        log_sigma = torch.linspace(-1, 1, mu.shape[1])
+        found = reinforce.log_probability(policy, y, s, s[:, : mu.shape[1]], log_sigma)
+        normal = torch.distributions.Normal(mu, log_sigma.exp())
+        torch.testing.assert_close(found, normal.log_prob(s[:, : mu.shape[1]]).sum(1))
+
+
+class Remembered(gymnasium.Wrapper):
+    """Keeps the actions of every episode where the test can see them."""
+
+    played: list = []  # noqa: RUF012
+
+    def reset(self, **arguments):
+        """Begin a list."""
+        self.played.append([])
+        return self.env.reset(**arguments)
+
+    def step(self, action):
+        """Keep the action and what comes of it."""
+        following = self.env.step(action)
+        self.played[-1].append((np.array(action).tolist(), following[0].tolist(), following[1]))
+        return following
+
+
+@pytest.mark.parametrize("name", ["Acrobot-v1", "MountainCarContinuous-v0"])
+def test_both_engines_take_the_same_first_episode_to_the_bit(name, monkeypatch):
+    config = dataclasses.replace(CONFIGS[name], max_episode_steps=250)
+    played = []
+    for engine in ("compiled", "torch"):
+        monkeypatch.setattr(Remembered, "played", [])
+        of_engine = dataclasses.replace(config, engine=engine)
+        found = run_of(
+            lambda: Remembered(gymnasium.make(name).unwrapped), of_engine, episodes=2, seeds=[3]
+        )
+        played.append((Remembered.played[0], found))
+    assert len(played[0][0]) == 250
+    assert played[0][0] == played[1][0]
+    (_, compiled), (_, through_torch) = played
+    assert compiled.arrays.keys() == through_torch.arrays.keys()
+    for array in (name for name in compiled.arrays if name.startswith("initial/")):
+        np.testing.assert_array_equal(compiled.arrays[array], through_torch.arrays[array])
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_both_engines_end_fifty_updates_of_an_episode_alike(name):
+    """Five epochs of ten shuffled minibatches: what a whole run makes of the first episode."""
     config = dataclasses.replace(
-        CONFIGS["Acrobot-v1"], batch_size=batch_size, epochs=2, max_episode_steps=1000
+        CONFIGS[name], max_episode_steps=400, batch_size=40, epochs=5, learning_rate=1e-3
     )
-    run = run_of("Acrobot-v1", config, episodes=1, seeds=[1])
-    streams = spawn_streams(1)
-    environment, policy = (
-        open_environment("Acrobot-v1"),
-        make_policy(Categorical(), (10, 20), 6, 3, 0),
+    compiled, through_torch = (
+        run_of(name, dataclasses.replace(config, engine=engine), episodes=1, seeds=[1])
+        for engine in ("compiled", "torch")
     )
-    environment.seed(streams.environment_seed)
-    parameters = policies.initial_parameters(policy, Categorical(), streams.network)
-    trajectory = Trajectory(6, 1)
-    steps, _ = environment.play(policy, parameters, streams.policy, 1000, trajectory)
-    assert steps == 1000
-    observations, actions, rewards = map(torch.from_numpy, trajectory.first(steps))
-    returns = torch.empty(steps, dtype=torch.float64)
-    following = 0.0
-    for t in reversed(range(steps)):
-        following = returns[t] = rewards[t] + 0.99 * following
-    returns = ((returns - returns.mean()) / returns.std(correction=0)).float()
-    module = networks.to_torch((6, 10, 20, 3), parameters)
-    optimiser = torch.optim.Adam(module.parameters(), lr=config.learning_rate)
-    for _ in range(2):
-        order = np.arange(steps)
-        if batch_size < steps:
-            streams.network.shuffle(order)
-        for start in range(0, steps, batch_size):
-            batch = torch.from_numpy(order[start : start + batch_size])
-            logs = torch.log_softmax(module(observations[batch]), 1)
-            taken = logs.gather(1, actions[batch].long())[:, 0]
-            optimiser.zero_grad()
-            (-(taken * returns[batch]).mean()).backward()
-            optimiser.step()
-    expected = np.concatenate([p.detach().numpy().ravel() for p in module.parameters()])
-    layers = {name: array[0] for name, array in run.arrays.items() if "/" not in name}
-    _, found = networks.pack(layers)
-    moved = np.abs(found - parameters)
-    # Where a gradient is next to nothing, Adam makes much of how it was rounded.
-    assert np.quantile(np.abs(found - expected), 0.95) < 2e-5
-    assert np.abs(found - expected).max() < 0.1 * moved.max()
+    assert compiled.table.equals(through_torch.table)
+    for array, found in compiled.arrays.items():
+        np.testing.assert_allclose(found, through_torch.arrays[array], rtol=0, atol=1e-4)
+        moved = np.abs(found - compiled.arrays[f"initial/{array.rpartition('/')[2]}"]).max()
+        assert "/" in array or array == "log_sigma" or moved > 5e-3
 
 
 @pytest.mark.parametrize(
-    ("distribution", "biases"),
-    [
-        (Gaussian(mean="weights", sigma=0.3), False),
-        (Gaussian(mean="weights", sigma=0.5, constant_feature=True), False),
-        (Gaussian(mean="weights", sigma=1.0, learn_sigma=True), True),
-        (Gaussian(mean="direct", sigma=0.5, learn_sigma=True, constant_feature=True), True),
-    ],
+    "network", [MLP(), Module("toy_networks:make"), Module("toy_networks:with_dropout")]
 )
-def test_one_episode_of_gaussian_learning_is_adam_on_the_stated_gradient(distribution, biases):
-    """The same weights from torch: `Normal.log_prob` of the raw actions, autograd, Adam."""
-    name, steps = "MountainCarContinuous-v0", 1000
-    config = dataclasses.replace(CONFIGS[name], policy=distribution, biases=biases)
-    config = dataclasses.replace(config, max_episode_steps=steps)
-    run = run_of(name, config, episodes=1, seeds=[1])
-    streams, environment = spawn_streams(1), open_environment(name)
-    environment.seed(streams.environment_seed)
-    policy = make_policy(distribution, (10, 20), 2, 0, 1)
-    parameters = policies.initial_parameters(policy, distribution, streams.network)
-    trajectory = Trajectory(2, 1)
-    environment.play(policy, parameters, streams.policy, steps, trajectory)
-    observations, actions, rewards = trajectory.first(steps)
-    returns = discounted_returns(rewards, 0.99)
-    weights = torch.from_numpy(returns - returns.mean()).float()
-    module = networks.to_torch(tuple(policy.sizes.tolist()), parameters[:-1])
-    log_sigma = torch.nn.Parameter(torch.from_numpy(parameters[-1:].copy()))
-    learning = [p for p in module.parameters() if biases or p.ndim > 1]
-    learning += [log_sigma] if distribution.learn_sigma else []
-    optimiser = torch.optim.Adam(learning, lr=config.learning_rate)
-    features = torch.from_numpy(observations)
-    if distribution.constant_feature:
-        features = torch.column_stack([features, torch.ones(steps)])
-    order = np.arange(steps)
-    streams.network.shuffle(order)
-    for batch in map(torch.from_numpy, (order[:512], order[512:])):
-        outputs = module(features[batch])
-        means = (outputs * features[batch]).sum(1) if distribution.mean == "weights" else outputs
-        normal = torch.distributions.Normal(means.reshape(-1, 1), log_sigma.exp())
-        taken = normal.log_prob(torch.from_numpy(actions)[batch])[:, 0]
-        optimiser.zero_grad()
-        (-(taken * weights[batch]).mean()).backward()
-        optimiser.step()
-    expected = np.concatenate([p.detach().numpy().ravel() for p in module.parameters()])
-    last = {name: array[0] for name, array in run.arrays.items() if "/" not in name}
-    assert last["log_sigma"] == pytest.approx(log_sigma.detach().numpy(), abs=2e-5)
-    assert (last["log_sigma"] != parameters[-1:]).all() == distribution.learn_sigma
-    _, found = networks.pack(last)
-    moved = np.abs(found - parameters[:-1])
-    assert moved.max() > 1e-3
-    # The terms of a sum nearly cancel, so that its rounding shows; Adam makes much of that.
-    assert np.median(np.abs(found - expected)) < 1e-5
-    assert np.quantile(np.abs(found - expected), 0.9) < 0.05 * moved.max()
+def test_the_torch_learner_gives_the_same_bits_twice(network):
+    config = ReinforceConfig(network=network, engine="torch", max_episode_steps=60, batch_size=25)
+    runs = []
+    for threads in (1, 2):
+        before = torch.get_num_threads()
+        torch.set_num_threads(threads)
+        torch.rand(threads)
+        runs.append(run_of("Acrobot-v1", config, episodes=4, seeds=[0, 7], snapshots=(2,)))
+        torch.set_num_threads(before)
+    assert_same(*runs)
+    alone = run_of("Acrobot-v1", config, episodes=4, seeds=[7], snapshots=(2,))
+    assert_same(only(runs[0], [0, 7], 1), alone)
+
+
+# Any network
+
+
+def test_a_module_comes_back_under_its_own_names_and_loads_again():
+    network = Module("toy_networks:make")
+    config = ReinforceConfig(network=network, policy=Gaussian(mean="direct"), max_episode_steps=50)
+    found = run_of("MountainCarContinuous-v0", config, episodes=3, seeds=[0, 1], snapshots=(2,))
+    names = {"body.weight", "body.bias", "head.weight", "calls", "log_sigma"}
+    moments = ("", "initial/", "episode2/")
+    assert set(found.arrays) == {moment + name for moment in moments for name in names}
+    assert found.arrays["body.weight"].shape == (2, 8, 2)
+    assert (found.arrays["head.weight"] != found.arrays["initial/head.weight"]).all()
+    assert found.arrays["initial/calls"].tolist() == [0, 0]
+    weights = weights_of(found.arrays, 1)
+    del weights["log_sigma"]
+    module = modules.make_module(network, 2, 1, np.random.default_rng(9))
+    modules.load_arrays(module, weights)
+    expected = np.tanh([0.5, 0.1] @ weights["body.weight"].T + weights["body.bias"])
+    output = module(torch.tensor([[0.5, 0.1]])).detach().numpy()[0]
+    np.testing.assert_allclose(output, expected @ weights["head.weight"].T, rtol=1e-4)
+
+
+def test_the_reports_network_as_a_module_learns_a_bandit():
+    config = ReinforceConfig(
+        network=Module("toy_networks:plain"), learning_rate=0.02, epochs=1, normalise="none"
+    )
+
+    def bandit():
+        return Bandit(spaces.Discrete(3), [0.0, 1.0, 0.2].__getitem__)
+
+    table = run_of(bandit, config, episodes=400, seeds=[0]).table
+    assert table["return"].tail(100).mean() > 0.95
+
+
+def test_a_module_travels_to_workers(tmp_path):
+    config = ReinforceConfig(network=Module("toy_networks:make"), max_episode_steps=30)
+    arm = Arm("module", reinforce.reinforce, "MountainCar-v0", config, 2)
+    results = run([arm], seeds=[0, 1], store=tmp_path, workers=2, progress=False)
+    direct = run_of("MountainCar-v0", config, episodes=2, seeds=[0, 1])
+    assert results.table.drop(columns="arm").equals(direct.table)
+    for name, array in direct.arrays.items():
+        np.testing.assert_array_equal(results.arrays("module")[name], array)
+    assert config.network.code in results.provenance["config"].iloc[0]
+
+
+@pytest.mark.parametrize("name", ["one_too_many", "other_inputs", "no_module", "raising"])
+def test_a_network_that_does_not_fit_is_refused_before_an_episode_is_played(name):
+    class Untouched(Chain):
+        def reset(self, **arguments):
+            raise AssertionError("an episode was begun")
+
+    config = ReinforceConfig(network=Module(f"toy_networks:{name}"))
+    with pytest.raises(ValueError, match=rf"^network must .*toy_networks:{name}"):
+        run_of(Untouched, config, episodes=1, seeds=[0])
+    with pytest.raises(ValueError, match=rf"^network must .*toy_networks:{name}"):
+        reinforce.check_reinforce(Untouched, config)
 
 
 # What a run promises
@@ -377,7 +536,8 @@ def test_training_compiled_and_through_gymnasium_gives_the_same_bits(name):
     arguments = {"episodes": 5, "seeds": [0, 3], "snapshots": (2,)}
     compiled = run_of(name, **arguments)
     assert_same(compiled, run_of(plain, CONFIGS[name], **arguments))
-    assert_same(compiled, run_of(plain(), CONFIGS[name], **arguments))
+    one = {**arguments, "seeds": [3]}
+    assert_same(only(compiled, [0, 3], 1), run_of(plain(), CONFIGS[name], **one))
 
 
 def test_seeds_differ_in_weights_actions_and_environment():
@@ -386,12 +546,11 @@ def test_seeds_differ_in_weights_actions_and_environment():
     weights = run.arrays["initial/layer0.weight"].reshape(10, -1)
     assert len(np.unique(weights, axis=0)) == 10
     policy, starts, actions = make_policy(Categorical(), (10, 20), 6, 3, 0), [], []
-    parameters = np.zeros(networks.count_parameters((6, 10, 20, 3)), np.float32)
+    actor = likelihood.make_actor(policy, np.zeros(353, np.float32))
     for seed in range(10):
-        streams, environment = spawn_streams(seed), open_environment(name)
-        environment.seed(streams.environment_seed)
-        trajectory = Trajectory(6, 1)
-        environment.play(policy, parameters, streams.policy, 50, trajectory)
+        streams, world, trajectory = spawn_streams(seed), open_world(name), Trajectory(6, 1)
+        world.seed(streams.environment_seed)
+        play_episode(world, actor, streams.policy, 50, trajectory)
         starts.append(trajectory.observations[0].copy())
         actions.append(trajectory.actions[:50, 0].copy())
     assert len(np.unique(starts, axis=0)) == 10
@@ -402,7 +561,8 @@ def test_global_random_states_are_left_alone():
     before = torch.get_rng_state(), str(np.random.get_state()), random.getstate()  # noqa: NPY002
     threads = torch.get_num_threads()
     run_of("Acrobot-v1", episodes=2, seeds=[0, 1])
-    run_of("CartPole-v1", ReinforceConfig(), episodes=2, seeds=[0, 1])
+    run_of(lambda: gymnasium.make("CartPole-v1"), ReinforceConfig(), episodes=2, seeds=[0, 1])
+    run_of("CartPole-v1", ReinforceConfig(engine="torch"), episodes=2, seeds=[0, 1])
     assert torch.equal(before[0], torch.get_rng_state())
     assert before[1:] == (str(np.random.get_state()), random.getstate())  # noqa: NPY002
     assert torch.get_num_threads() == threads
@@ -486,7 +646,7 @@ def test_learning_from_capped_episodes_is_a_choice(learns):
 def test_a_seed_that_diverges_is_named_and_the_others_go_on(payment):
     seeds = tuple(range(12))
     broken = [seed for seed in seeds if breaks(spawn_streams(seed).environment_seed)]
-    config = ReinforceConfig(hidden=(3,), normalise="none")
+    config = ReinforceConfig(network=MLP((3,)), normalise="none")
     arguments = {"episodes": 8, "seeds": seeds, "snapshots": (6,)}
     run = run_of(lambda: Breaking(payment), config, **arguments)
     healthy = run_of(lambda: Breaking(0.5), config, **arguments)
@@ -512,7 +672,7 @@ def test_a_bandit_with_discrete_actions_is_solved(hidden):
     def bandit():
         return Bandit(spaces.Discrete(3), [0.0, 1.0, 0.2].__getitem__)
 
-    config = ReinforceConfig(hidden=hidden, learning_rate=0.02, epochs=1, normalise="none")
+    config = ReinforceConfig(network=MLP(hidden), learning_rate=0.02, epochs=1, normalise="none")
     table = run_of(bandit, config, episodes=1000, seeds=range(5)).table
     last = table[table["episode"] > 900].groupby("seed")["return"].mean()
     assert (last > 0.95).all()
@@ -525,7 +685,7 @@ def test_a_bandit_with_a_continuous_action_is_solved(mean):
 
     config = ReinforceConfig(
         policy=Gaussian(mean=mean, sigma=0.5, learn_sigma=True),
-        hidden=(8,),
+        network=MLP((8,)),
         learning_rate=5e-3,
         epochs=1,
         normalise="none",
@@ -548,7 +708,7 @@ def test_a_bandit_with_two_action_dimensions_is_solved(mean, limit):
 
     config = ReinforceConfig(
         policy=Gaussian(mean=mean, sigma=0.3, learn_sigma=False),
-        hidden=(8,),
+        network=MLP((8,)),
         learning_rate=2e-3,
         epochs=1,
         normalise="none",
@@ -587,12 +747,12 @@ def test_the_reward_is_charged_on_the_unclipped_action():
 
 
 @pytest.mark.slow
-def test_cart_pole_is_learned_through_the_plain_loop():
+def test_cart_pole_is_learned():
     """At least 450 over the last 50 episodes for most seeds.
 
     The settings were chosen on the seeds 1000 to 1014, of which 13 got there.
     """
-    config = ReinforceConfig(gamma=0.995, hidden=(64,), learning_rate=2e-3, epochs=1)
+    config = ReinforceConfig(gamma=0.995, network=MLP((64,)), learning_rate=2e-3, epochs=1)
     table = run_of("CartPole-v1", config, episodes=1000, seeds=range(10)).table
     last = table[table["episode"] > 950].groupby("seed")["return"].mean()
     assert (last >= 450).sum() >= 7
@@ -607,28 +767,16 @@ def test_cart_pole_is_learned_through_the_plain_loop():
         ("gamma", -0.1),
         ("gamma", 1.1),
         ("gamma", np.nan),
-        ("gamma", True),
-        ("gamma", "high"),
-        ("hidden", (10, 0)),
-        ("hidden", (10, -3)),
-        ("hidden", (10.0,)),
-        ("hidden", [10]),
-        ("hidden", 10),
-        ("biases", "no"),
-        ("policy", "categorical"),
         ("learning_rate", 0.0),
         ("learning_rate", -1e-3),
         ("learning_rate", np.inf),
         ("learning_rate", np.nan),
-        ("learning_rate", True),
         ("batch_size", 0),
-        ("batch_size", 1.5),
         ("epochs", 0),
         ("normalise", "both"),
-        ("normalise", np.array(["none", "centre"])),
         ("max_episode_steps", 0),
         ("max_env_steps", -1),
-        ("learn_from_capped", 1),
+        ("engine", "jax"),
     ],
 )
 def test_a_setting_out_of_range_is_refused(field, value):
@@ -637,23 +785,43 @@ def test_a_setting_out_of_range_is_refused(field, value):
 
 
 @pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("gamma", True),
+        ("gamma", "high"),
+        ("network", (10, 20)),
+        ("network", None),
+        ("network", torch.nn.Linear(2, 3)),
+        ("network", "toy_networks:make"),
+        ("policy", "categorical"),
+        ("learning_rate", True),
+        ("batch_size", 1.5),
+        ("normalise", np.array(["none", "centre"])),
+        ("learn_from_capped", 1),
+        ("engine", torch),
+    ],
+)
+def test_a_setting_of_another_kind_is_refused(field, value):
+    with pytest.raises(TypeError, match=rf"(?s)^{field} must be .*, got "):
+        ReinforceConfig(**{field: value})
+
+
+def test_a_module_is_not_compiled():
+    with pytest.raises(ValueError, match=r"^engine must be 'torch' for a Module, got 'compiled'"):
+        ReinforceConfig(network=Module("toy_networks:make"), engine="compiled")
+    assert ReinforceConfig(network=Module("toy_networks:make")).engine == "torch"
+
+
+@pytest.mark.parametrize(
     ("argument", "value"),
     [
         ("seeds", []),
-        ("seeds", [1, 1]),
-        ("seeds", [-1]),
-        ("seeds", [0.5]),
-        ("seeds", [True]),
-        ("seeds", 5),
         ("seeds", None),
         ("episodes", 0),
-        ("episodes", 2.5),
         ("snapshots", (11,)),
-        ("snapshots", (-1,)),
-        ("snapshots", 5),
-        ("snapshots", (2 * n for n in range(9))),
         ("progress", 5),
         ("config", None),
+        ("config", {"gamma": 0.9}),
     ],
 )
 def test_an_argument_out_of_range_is_refused_before_anything_runs(argument, value):
@@ -661,7 +829,7 @@ def test_an_argument_out_of_range_is_refused_before_anything_runs(argument, valu
         raise AssertionError("an environment was made")
 
     arguments = {"config": ReinforceConfig(), "episodes": 10, "seeds": [0], argument: value}
-    with pytest.raises(ValueError, match=rf"^{argument} must be .*, got "):
+    with pytest.raises((TypeError, ValueError), match=rf"^{argument} must be .*, got "):
         reinforce.reinforce(refuse, arguments.pop("config"), **arguments)
 
 
@@ -676,7 +844,7 @@ def test_a_policy_over_other_actions_is_refused(env, policy):
 
 @pytest.mark.parametrize("env", ["Pole-v7", "nowhere:Foo-v0", "a b"])
 def test_an_unknown_environment_is_refused(env):
-    with pytest.raises(ValueError, match=f"env must be an id that Gymnasium knows, got {env!r}"):
+    with pytest.raises(ValueError, match=f"^env must .*, got {env!r}"):
         reinforce.reinforce(env, ReinforceConfig(), episodes=1, seeds=[0])
 
 
@@ -685,16 +853,7 @@ def test_numpys_numbers_are_numbers():
         gamma=np.float32(0.5), learning_rate=np.float64(1e-3), batch_size=np.int64(7)
     )
     plain = ReinforceConfig(gamma=0.5, learning_rate=1e-3, batch_size=7)
-    runs = [reinforce.reinforce("Acrobot-v1", c, episodes=1, seeds=[0]) for c in (config, plain)]
-    assert_same(*runs)
-    assert provenance.describe(config) == provenance.describe(plain)
-
-
-def test_a_generator_of_snapshots_is_not_used_up():
-    config = ReinforceConfig(max_episode_steps=20)
-    every = (n for n in (1, 2))
-    run = reinforce.reinforce("Acrobot-v1", config, episodes=2, seeds=[0, 1], snapshots=every)
-    assert {"episode1/layer0.weight", "episode2/layer0.weight"} <= set(run.arrays)
+    assert describe(config) == describe(plain)
 
 
 def test_a_config_is_plain_data():

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pandas as pd
-import pytest
 
 from studies import reinforce as study
 
@@ -60,8 +59,3 @@ def test_seeds_are_compared_with_themselves():
     assert column["Acrobot, as reported"] == ""
     assert column["Acrobot, gamma 0.9"] == "20 [20, 20]"
     assert column["MountainCar, raw returns"] == "0 [0, 0]"
-
-
-@pytest.mark.parametrize(("interval", "text"), [((-3.0, -np.inf, 4.0), "−3 [−∞, 4]")])
-def test_intervals_have_signs(interval, text):
-    assert study._interval(interval) == text

@@ -20,11 +20,11 @@ from drawings.look import (
     SKY_BLUE,
     VERMILLION,
     label,
+    median_band,
 )
 from report.seeds import SEEDS
 from rl_core.evaluation import Weights, mean_actions, state_grid
 from rl_core.reinforce import ReinforceConfig
-from rl_core.statistics import bootstrap_interval
 from studies.continuous import (
     CONVERGED,
     EARLY,
@@ -38,14 +38,6 @@ from studies.continuous import (
 from studies.continuous_fates import FATES
 
 EVERY = 10  # episodes between drawn points
-
-
-def _middle(axes: Axes, x: np.ndarray, seeds: np.ndarray, text: str, colour: str, line) -> None:
-    """Median over seeds with its interval."""
-    rng = np.random.default_rng(np.random.SeedSequence(2020))
-    middle, low, high = bootstrap_interval(seeds, rng=rng, resamples=2_000)
-    axes.fill_between(x, low, high, color=colour, alpha=0.22, lw=0)
-    axes.plot(x, middle, color=colour, ls=line, label=text)
 
 
 def curve_data(curves: Curves, arms: Sequence[str]) -> pd.DataFrame:
@@ -107,7 +99,7 @@ def _every_seed(axes: Axes, curves: Curves, arm: str) -> None:
     axes.plot([], [], "x", color=VERMILLION, ms=6, label="budget used up")
     if good.any():
         text = "median of those that learned, 95% interval"
-        _middle(axes, x, smooth[good][:, x - 1], text, BLUE, "-")
+        median_band(axes, x, smooth[good][:, x - 1], colour=BLUE, line="-", text=text)
 
 
 def variants(curves: Curves, names: Mapping[str, str]) -> Figure:
@@ -118,7 +110,8 @@ def variants(curves: Curves, names: Mapping[str, str]) -> Figure:
         good = curves.learned(arm)
         text = f"{text} ({good.sum()} of {len(SEEDS)} learned)"
         if good.any():
-            _middle(axes, x, curves.smooth[arm][good][:, x - 1], text, colour, line)
+            steps = curves.smooth[arm][good][:, x - 1]
+            median_band(axes, x, steps, colour=colour, line=line, text=text)
         else:
             axes.plot([], [], color=colour, ls=line, label=text)
     axes.set_yscale("log")

@@ -6,13 +6,19 @@ import subprocess
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import imageio_ffmpeg
 import matplotlib as mpl
 import numpy as np
 from cycler import cycler
+from IPython import get_ipython
 from matplotlib.axes import Axes
+from matplotlib_inline.backend_inline import set_matplotlib_formats
 from numpy.typing import NDArray
+
+from rl_core.checks import instance, number, require
+from rl_core.statistics import bootstrap_interval
 
 # Okabe & Ito (2008), "Color universal design": told apart with every common colour blindness.
 BLACK = "#000000"
@@ -29,9 +35,11 @@ LINES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)))
 
 
 def use_style() -> None:
-    """Set matplotlib's defaults for the book: sizes that stay legible on a phone, few inks.
+    """Set matplotlib up for the book: sizes that stay legible on a phone, few inks.
 
     Lines differ in colour and in dash pattern, so that a black-and-white print can be read too.
+    What the reader's own settings say (matplotlibrc, MPLBACKEND, an IPython profile) is undone: in
+    a notebook, figures are shown inside it as PNG, and everything else begins at its default.
 
     Examples
     --------
@@ -39,6 +47,11 @@ def use_style() -> None:
     >>> mpl.rcParams["axes.spines.top"]
     False
     """
+    shell = get_ipython()
+    if hasattr(shell, "kernel"):
+        shell.run_line_magic("matplotlib", "inline")
+        set_matplotlib_formats("png")
+    mpl.rcdefaults()
     mpl.rcParams.update(
         {
             "figure.figsize": (6.4, 3.8),
@@ -74,6 +87,43 @@ def label(axes: Axes, *, x: str, y: str, title: str = "") -> None:
         axes.set_title(title)
 
 
+def median_band(
+    axes: Axes,
+    x: NDArray[np.integer],
+    seeds: NDArray[np.float64],
+    *,
+    colour: str,
+    line: Any,
+    text: str | None,
+    top: float | None = None,
+    marker: str = "",
+) -> None:
+    """Draw the median over seeds, and its 95% interval as a band.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    x : ndarray of shape (points,)
+    seeds : ndarray of shape (seeds, points)
+        A seed that stopped (NaN), or reached no goal, counts as needing for ever.
+    colour, line, marker : str
+        As in matplotlib; a line may be a dash pattern.
+    text : str or None
+        For the legend.
+    top : float, optional
+        To where the band goes if it has no end; by default the largest value of a seed.
+    """
+    values = np.where(np.isnan(seeds), np.inf, seeds)
+    rng = np.random.default_rng(np.random.SeedSequence(2020))
+    middle, low, high = bootstrap_interval(values, rng=rng, resamples=2_000)
+    upper = np.where(np.isinf(high), np.nanmax(seeds) if top is None else top, high)
+    axes.fill_between(
+        *(x, low, upper), where=np.isfinite(low).tolist(), color=colour, alpha=0.22, lw=0
+    )
+    drawn = np.where(np.isinf(middle), np.nan, middle)
+    axes.plot(x, drawn, color=colour, ls=line, marker=marker, ms=4, label=text)
+
+
 class Film:
     """A silent film that a notebook shows as an HTML video, its data inside the page.
 
@@ -92,7 +142,7 @@ class Film:
 
     Raises
     ------
-    ValueError
+    TypeError, ValueError
         If there is no frame, a frame is not an RGB picture of the first one's size, or
         `frames_per_second` is not positive.
 
@@ -111,21 +161,16 @@ class Film:
         frames_per_second: float,
         description: str,
     ) -> None:
-        if not frames_per_second > 0:
-            raise ValueError(f"frames_per_second must be positive, not {frames_per_second}")
+        frames_per_second = number("frames_per_second", frames_per_second, above=0)
+        instance("description", description, str, "a str")
         pictures = [np.asarray(frame) for frame in frames]
-        if not pictures:
-            raise ValueError("frames is empty: a film needs at least one frame")
-        for number, picture in enumerate(pictures):
-            if picture.dtype != np.uint8 or picture.ndim != 3 or picture.shape[2] != 3:
-                raise ValueError(
-                    f"frame {number} must be uint8 (height, width, 3), "
-                    f"not {picture.dtype} {picture.shape}"
-                )
-            if picture.shape != pictures[0].shape:
-                raise ValueError(
-                    f"frame {number} has shape {picture.shape}, frame 0 {pictures[0].shape}"
-                )
+        require(pictures, "frames", pictures, "one frame or more")
+        for place, picture in enumerate(pictures):
+            fits = picture.dtype == np.uint8 and picture.ndim == 3 and picture.shape[2] == 3
+            shown, name = f"{picture.dtype} {picture.shape}", f"frames[{place}]"
+            require(fits, name, shown, "uint8 of shape (height, width, 3)")
+            same = picture.shape == pictures[0].shape
+            require(same, name, picture.shape, f"of the shape of the first, {pictures[0].shape}")
         self.description = description
         self.mp4 = _encode(pictures, frames_per_second)
 

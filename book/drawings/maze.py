@@ -14,6 +14,7 @@ from matplotlib.patches import Circle, Polygon, Rectangle
 from numpy.typing import NDArray
 
 from drawings.look import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILLION
+from rl_core.checks import floats, integer, integers, one_of, require
 from rl_core.maze import CLOCKWISE, MOVES, Maze
 from rl_core.planning import optimal_actions
 
@@ -49,6 +50,11 @@ def situation_figure(
     matplotlib.figure.Figure
         Closed for pyplot, so that a notebook shows it only where it is asked to.
 
+    Raises
+    ------
+    TypeError, ValueError
+        If `Q` has another shape or a value that is not finite, or the maze no such flags.
+
     Examples
     --------
     >>> maze = Maze()
@@ -56,6 +62,8 @@ def situation_figure(
     >>> figure.axes[0].get_title(loc="left")
     'Situation 5: flags A and B held'
     """
+    one_of("flags", flags, maze.flag_sets)
+    Q = floats("Q", Q, (len(maze.reachable_states()), len(MOVES)))
     rows, columns = maze.walls.shape
     figure = plt.figure(figsize=(0.92 * columns + 0.2, 0.92 * rows + 0.5))
     axes = figure.add_subplot()
@@ -202,6 +210,8 @@ def follow_policy(maze: Maze, policy: NDArray[np.integer], *, seed: int) -> list
 
     Raises
     ------
+    TypeError, ValueError
+        If the policy has another shape, or something else than actions.
     RuntimeError
         If the goal is not reached within 10,000 moves.
 
@@ -214,10 +224,13 @@ def follow_policy(maze: Maze, policy: NDArray[np.integer], *, seed: int) -> list
     >>> len(moves), moves[-1].next_state
     (6, 96)
     """
-    state, _ = maze.reset(seed=seed)
+    actions = integers("policy", policy, 0, len(MOVES) - 1)
+    n_states = len(maze.reachable_states())
+    require(len(actions) == n_states, "policy", len(actions), f"of {n_states} actions")
+    state, _ = maze.reset(seed=integer("seed", seed))
     moves: list[Move] = []
     for _ in range(10_000):
-        action = int(policy[state])
+        action = actions[state]
         next_state, reward, terminated, _, info = maze.step(action)
         moves.append(Move(state, action, info["slipped"], next_state, reward))
         state = next_state
@@ -243,13 +256,22 @@ def episode_frames(
     frames_per_move : int
         Frames for one move, at least 3.
 
-    Yields
-    ------
-    ndarray of uint8, shape (height, width, 3)
+    Returns
+    -------
+    iterator of ndarray of uint8, shape (height, width, 3)
         The frames.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If there is no move, or fewer than three frames for one.
     """
-    if frames_per_move < 3:
-        raise ValueError(f"frames_per_move must be at least 3, not {frames_per_move}")
+    frames_per_move = integer("frames_per_move", frames_per_move, 3)
+    require(moves, "moves", moves, "one move or more")
+    return _frames(maze, moves, frames_per_move)
+
+
+def _frames(maze: Maze, moves: list[Move], frames_per_move: int) -> Iterator[NDArray[np.uint8]]:
     stages = {held: _Stage(maze, held) for held in maze.flag_sets}
     slips = 0
     for number, move in enumerate(moves, start=1):

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from interactive.maze import world_data
 from interactive.page import Widget, doubles, significant
 from rl_core.checks import floats, instance, integer, integers, require
-from rl_core.exploration import Evaluation
+from rl_core.exploration import Trials
 from rl_core.maze import Maze
 from rl_core.q_learning import QLearningConfig, q_learning
 
@@ -145,7 +145,7 @@ def learning_log(
     later = integers("snapshots", snapshots, least=episodes + 1)
     require(sorted(set(later)) == list(later), "snapshots", later, "in rising order")
     last = max([episodes, *later])
-    config = replace(config, evaluation=Evaluation(every=last + 1))  # has streams of its own
+    config = replace(config, evaluation=Trials(every=last + 1))  # has streams of its own
     recorder = _Recorder(Maze(maze.layout, slip=maze.slip))
     played = q_learning(recorder, config, episodes=episodes, seeds=[seed], Q_star=best)
     whole = q_learning(

@@ -1,5 +1,7 @@
 """Tables with their captions."""
 
+import html
+import re
 from collections.abc import Mapping, Sequence
 
 import pandas as pd
@@ -17,6 +19,7 @@ def captioned(
     """Show a table with a caption and without its row numbers; words are set to the left.
 
     Its address on the page is that of its number: `#T_table-3-1` for "Table 3.1. Steps ...".
+    Caption, headings and cells are text: what would be markup in them is shown as it is written.
 
     Parameters
     ----------
@@ -37,9 +40,10 @@ def captioned(
     (True, True, False)
     """
     # A fixed id: the same table gives the same page, and links can lead to it.
-    number = caption.partition(". ")[0].rstrip(".")
-    styled = table.style.set_uuid(number.lower().replace(" ", "-").replace(".", "-"))
-    styled = styled.set_caption(caption).hide(axis="index").format(dict(formats or {}))
+    number = re.sub(r"[^\w.]+", " ", caption.partition(". ")[0]).strip(" .")
+    styled = table.style.set_uuid(re.sub(r"[ .]", "-", number.lower()))
+    styled = styled.set_caption(html.escape(caption, quote=False)).hide(axis="index")
+    styled = styled.format(dict(formats or {}), escape="html").format_index(escape="html", axis=1)
     words = [i for i, kind in enumerate(table.dtypes) if not pd.api.types.is_numeric_dtype(kind)]
     left = [CSSDict(selector=f".col{i}", props="text-align: left") for i in words]
     styled = styled.set_table_styles(left)

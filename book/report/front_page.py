@@ -1,13 +1,15 @@
-"""The front page: all claims in one table, the report's figures beside ours, what it took.
+"""The front page: findings, all claims in one table, the report's figures beside ours.
 
 Nothing here is typed by hand: the verdicts come from `results/claims.csv`, the curves from the data
-of the chapters' figures, the times from the provenance of the results.
+of the chapters' figures, the times from the provenance of the results. What a table says is text:
+it is escaped where it enters the page.
 """
 
 import base64
 import html
 import io
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +19,13 @@ from matplotlib.figure import Figure
 
 from drawings.look import BLUE, GREY
 from report import claims as judged
+from report.findings import Told
 from report.seeds import SEEDS
 
 VERDICTS = {  # in the order of the page: what failed stands first
     "does not hold": "No criterion is met, and at least one is missed by its whole interval.",
     "holds in part": "One part of it is borne out, another is not.",
+    "depends on the reading": "The report's words can be read in two ways, with two verdicts.",
     "cannot tell": "The interval holds the bound: more seeds would be needed.",
     "holds": "Every criterion is met by the whole of its interval.",
 }
@@ -133,46 +137,73 @@ def linked(text: str) -> str:
     return re.sub(r"((?:Figure|Table|Film)s? )?(S?\d+(?:\.\d+)?)", link, html.escape(text))
 
 
-def _measured(row: pd.Series) -> str:
-    estimate, low, high = (judged.number(row[name]) for name in ("estimate", "low", "high"))
-    interval = "" if row["low"] == row["high"] else f" <small>[{low}, {high}]</small>"
-    return f"<b>{estimate}</b>{interval}"
+def findings_list(findings: Sequence[Told]) -> str:
+    """The findings as an ordered list of HTML, each with the figure to look at."""
+    items = "".join(f"<li>{one.sentence} {linked(one.figure)}</li>" for one in findings)
+    return f'<ol class="findings">{items}</ol>'
+
+
+def _verdict(verdict: str, count: str = "") -> str:
+    name = re.sub(r"\W+", "-", verdict)
+    return f'<span class="verdict {name}">{count}{html.escape(verdict)}</span>'
+
+
+def _decided(row: pd.Series) -> judged.Evidence:
+    """What was measured of the criterion that made the verdict."""
+    names = ("estimate", "low", "high", "seeds")
+    return judged.Evidence(*(row[f"deciding_{name}"] for name in names))
+
+
+def _rest(row: pd.Series) -> str:
+    """What stands behind a click: how the verdict was made, and what else was asked."""
+    decided = _decided(row)
+    exact = decided.seeds == 0 and decided.low == decided.high
+    seeds = "exact" if exact else f"{decided.seeds} seeds"
+    bound, distance = judged.number(row["deciding_bound"]), judged.number(abs(row["distance"]))
+    side = "missed by" if row["distance"] < 0 else "kept by"
+    decides = f"{row['deciding_criterion']}: {decided} ({seeds}), bound {bound}, {side} {distance}"
+    lines = {
+        "Decides": decides,
+        "Criteria": row["criterion"] if row["criterion"] != row["deciding_criterion"] else "",
+        "Readings": row["readings"],
+        "Amended": row["amended"],
+    }
+    shown = [f"{name}: {html.escape(text)}." for name, text in lines.items() if _said(text)]
+    return "".join(f"<p>{line}</p>" for line in [*shown, f"See {linked(row['figure'])}."])
+
+
+def _said(text: object) -> bool:
+    """Whether a cell has a text: empty ones are read from a file as NaN."""
+    return isinstance(text, str) and bool(text)
 
 
 def _row(row: pd.Series) -> str:
-    first, *others = row["criterion"].split("; ")
-    more = "".join(f"<li>{html.escape(other)}</li>" for other in others)
-    rest = f"<details><summary>and {len(others)} more</summary><ul>{more}</ul></details>"
-    verdict = row["verdict"]
-    seeds = "exact" if row["seeds"] == 0 and row["low"] == row["high"] else f"{row['seeds']}"
+    decided = _decided(row)
+    interval = f" <small>{str(decided).partition(' ')[2]}</small>".replace(" <small></small>", "")
+    claim = f"<details><summary>{html.escape(row['claim'])}</summary>{_rest(row)}</details>"
+    if row["verdict"] == "depends on the reading":
+        claim += f'<div class="readings">{html.escape(row["readings"])}</div>'
+    name = html.escape(row["id"])
     cells = {
-        "id": f'<a href="{PAGES[chapter_of(row)]}.html#verdicts">{row["id"]}</a>',
-        "claim of 2018": html.escape(row["claim"]),
-        "verdict": f'<span class="verdict {verdict.replace(" ", "-")}">{verdict}</span>',
-        "measured": _measured(row),
-        "what was measured": html.escape(first) + (rest if others else ""),
-        "seeds": seeds,
-        "see": linked(row["figure"]),
+        "id": f'<a href="{PAGES[int(row["chapter"])]}.html#verdicts">{name}</a>',
+        "claim of 2018": claim,
+        "verdict": _verdict(row["verdict"]),
+        "measured": f"<b>{judged.number(decided.estimate)}</b>{interval}",
+        "see": linked(row["figure"].split(",")[0]),
     }
     return "<tr>" + "".join(f'<td data-label="{k}">{v}</td>' for k, v in cells.items()) + "</tr>"
-
-
-def chapter_of(row: pd.Series) -> int:
-    """The chapter that judges a claim: that of the first figure or table it points to."""
-    page = re.search(r'href="(\w+)\.html', linked(row["figure"]))[1]
-    return next(chapter for chapter, name in PAGES.items() if name == page)
 
 
 def claims_table(table: pd.DataFrame) -> str:
     """The claims as HTML: grouped by verdict, what failed first; a click on a heading sorts."""
     order = {verdict: place for place, verdict in enumerate(VERDICTS)}
     grouped = table.sort_values("verdict", key=lambda column: column.map(order), kind="stable")
-    names = ["id", "claim of 2018", "verdict", "measured", "what was measured", "seeds", "see"]
+    names = ["id", "claim of 2018", "verdict", "measured", "see"]
     head = "".join(f'<th scope="col"><button type="button">{name}</button></th>' for name in names)
     body = "\n".join(_row(row) for _, row in grouped.iterrows())
     return (
         '<table class="claims sortable"><caption>Every claim of the report, with its verdict. '
-        "Measured: the first quantity of its criterion and the 95% interval."
+        "Measured: the quantity that decides, with its 95% interval. A claim opens to the rest."
         '<span class="sorts"> A click on a heading sorts.</span></caption>'
         f"<thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table>"
     )
@@ -181,8 +212,9 @@ def claims_table(table: pd.DataFrame) -> str:
 def verdict_bar(table: pd.DataFrame) -> str:
     """The verdicts as one bar of HTML, each part as wide as its share of the claims."""
     parts = "".join(
-        f'<span class="verdict {verdict.replace(" ", "-")}" style="flex-grow:{count}" '
-        f'title="{VERDICTS[verdict]}"><b>{count}</b> {verdict}</span>'
+        _verdict(verdict, f"<b>{count}</b> ").replace(
+            "<span", f'<span style="flex-grow:{count}" title="{html.escape(VERDICTS[verdict])}"', 1
+        )
         for verdict, count in counts(table).items()
         if count
     )
@@ -242,8 +274,8 @@ def _picture(figure: Figure) -> str:
 
 def _card(number: str, page: str, figure: Figure, title: str, text: str) -> str:
     return (
-        f'<a class="thumbnail" href="{page}"><img src="{_picture(figure)}" '
-        f'alt="{html.escape(text)}"><span>{number}. {html.escape(title)}</span></a>'
+        f'<a class="thumbnail" href="{html.escape(page)}"><img src="{_picture(figure)}" '
+        f'alt="{html.escape(text)}"><span>{html.escape(number)}. {html.escape(title)}</span></a>'
     )
 
 

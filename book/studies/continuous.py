@@ -27,9 +27,10 @@ from rl_core.statistics import (
     episodes_to_threshold,
     learned,
     learning_curves,
-    probability_of_improvement,
     proportion_interval,
 )
+from studies import shared
+from studies.shared import interval_text, lower_evidence, median_evidence
 
 ENV = "MountainCarContinuous-v0"
 EPISODES = 5_000
@@ -366,33 +367,24 @@ def milestones(curves: Curves) -> pd.DataFrame:
 def _text(interval: Interval) -> str:
     if np.isneginf(interval.low):
         return "none"
-    estimate, low, high = ("∞" if np.isinf(x) else f"{x:,.0f}" for x in interval)
-    return f"{estimate} [{low}, {high}]"
+    return interval_text(interval)
 
 
 def wall_clock(results: Results) -> pd.DataFrame:
     """Seconds one seed took, here and in the report."""
-    made = results.provenance[results.provenance["arm"] == "as reported"]
-    return pd.DataFrame(
-        {
-            "experiment": [f"{ENV}, as reported, one seed"],
-            "2018 (s)": [60 * REPORTED_MINUTES],
-            "now (s, mean)": [made["seconds"].mean()],
-            "now, all seeds (s)": [made["seconds"].sum()],
-            "processor": [made["processor"].iloc[0]],
-        }
-    )
+    arms = {"as reported": (f"{ENV}, as reported, one seed", 60 * REPORTED_MINUTES)}
+    return shared.wall_clock(results, arms, "now, all seeds (s)")
 
 
 def median_seed(curves: Curves, arm: str) -> int:
-    """Position of the seed in the middle of those that learned, by their steps at the end.
+    """The seed in the middle of those that learned, by their steps at the end.
 
     If none learned, of all seeds: a rule, not a pick.
     """
     good = curves.learned(arm)
     steps = np.where(good, curves.at(arm), np.inf)
     order = np.argsort(steps, kind="stable")
-    return int(order[(max(int(good.sum()), 1) - 1) // 2])
+    return int(SEEDS[order[(max(int(good.sum()), 1) - 1) // 2]])
 
 
 def findings(curves: Curves) -> list[Finding]:
@@ -402,13 +394,13 @@ def findings(curves: Curves) -> list[Finding]:
 
     def about(arm: str, episode: int) -> tuple[Evidence, Evidence]:
         steps, by_then = curves.at(arm, episode), curves.learned(arm, episode)
-        return _steps(steps, rng), _steps(steps[by_then], rng)
+        return median_evidence(steps, rng), median_evidence(steps[by_then], rng)
 
     def lower(one: str, other: str, measure: Callable[[str], np.ndarray]) -> Evidence:
-        return _probability(measure(one), measure(other), rng)
+        return lower_evidence(measure(one), measure(other), rng)
 
     def lower_if_learned(one: str, other: str, measure: Callable[[str], np.ndarray]) -> Evidence:
-        return _probability(measure(one)[good[one]], measure(other)[good[other]], rng)
+        return lower_evidence(measure(one)[good[one]], measure(other)[good[other]], rng)
 
     def more_learn(one: str, other: str) -> Evidence:
         difference = good[one].astype(float) - good[other]
@@ -449,15 +441,3 @@ def closest(curves: Curves, episode: int, steps: float) -> str:
         if curves.learned(arm).sum() > len(SEEDS) / 2
     }
     return min(medians, key=lambda arm: abs(medians[arm] - steps), default="as reported")
-
-
-def _steps(values: np.ndarray, rng: np.random.Generator) -> Evidence:
-    return Evidence(*_middle(values, rng), seeds=len(values))
-
-
-def _probability(one: np.ndarray, other: np.ndarray, rng: np.random.Generator) -> Evidence:
-    """Probability that a seed of `one` has the lower value; without seeds, anything."""
-    seeds = min(len(one), len(other))
-    if seeds == 0:
-        return Evidence(0.5, 0.0, 1.0, seeds=0)
-    return Evidence(*probability_of_improvement(one, other, rng=rng), seeds=seeds)

@@ -24,9 +24,10 @@ from rl_core.statistics import (
     learned,
     learning_curves,
     paired_difference_interval,
-    probability_of_improvement,
     proportion_interval,
 )
+from studies import shared
+from studies.shared import interval_text, lower_evidence, median_evidence
 
 EPISODES = 2_000
 BUDGET = 4_000_000  # environment steps a seed
@@ -194,7 +195,7 @@ def milestones(table: pd.DataFrame, curves: Curves) -> pd.DataFrame:
         row = {"arm": arm}
         for episode in MILESTONES:
             steps = curves.at(arm, episode)
-            row[f"steps at {episode:,}"] = _interval(bootstrap_interval(steps, rng=rng))
+            row[f"steps at {episode:,}"] = interval_text(bootstrap_interval(steps, rng=rng))
         count = int(curves.learned(arm).sum())
         row[PAIRED] = _against_reported(curves, str(arm), rng)
         row["learned"] = f"{count} of {len(SEEDS)}"
@@ -212,36 +213,21 @@ def _against_reported(curves: Curves, arm: str, rng: np.random.Generator) -> str
     if arm == reported:
         return ""
     ends = (curves.at(one, EPISODES) for one in (arm, reported))
-    return _interval(paired_difference_interval(*ends, rng=rng))
-
-
-def _interval(interval: tuple[float, float, float]) -> str:
-    texts = (f"{x:,.0f}".replace("inf", "∞").replace("-", "−") for x in interval)
-    return "{} [{}, {}]".format(*texts)
+    return interval_text(paired_difference_interval(*ends, rng=rng))
 
 
 def wall_clock(results: Results, reported_minutes: dict[str, float]) -> pd.DataFrame:
     """Seconds one seed took, here and in the report."""
-    made = results.provenance
-    rows = []
-    for name, minutes in reported_minutes.items():
-        of_arm = made[made["arm"] == f"{name}, as reported"]
-        rows.append(
-            {
-                "experiment": f"{name}, REINFORCE, one seed",
-                "2018 (s)": 60 * minutes,
-                "now (s, mean)": of_arm["seconds"].mean(),
-                "now, all seeds (s)": of_arm["seconds"].sum(),
-                "processor": of_arm["processor"].iloc[0],
-            }
-        )
-    return pd.DataFrame(rows)
+    arms = {
+        f"{name}, as reported": (f"{name}, REINFORCE, one seed", 60 * minutes)
+        for name, minutes in reported_minutes.items()
+    }
+    return shared.wall_clock(results, arms, "now, all seeds (s)")
 
 
 def median_seed(curves: Curves, arm: str) -> int:
-    """The seed in the middle when all are ordered by their steps at the end: a rule, not a pick."""
-    order = np.argsort(curves.at(arm, EPISODES), kind="stable")
-    return int(SEEDS[order[(len(order) - 1) // 2]])
+    """The seed in the middle when all are ordered by their steps at the end."""
+    return shared.middle_seed(curves.at(arm, EPISODES))
 
 
 def findings(curves: Curves) -> list[Finding]:
@@ -250,11 +236,10 @@ def findings(curves: Curves) -> list[Finding]:
 
     def about(arm: str, episode: int) -> tuple[Evidence, Evidence]:
         steps, good = curves.at(arm, episode), curves.learned(arm, episode)
-        return _evidence(steps, rng), _evidence(steps[good], rng)
+        return median_evidence(steps, rng), median_evidence(steps[good], rng)
 
     def better(one: str, other: str, measure: Callable[[str], np.ndarray]) -> Evidence:
-        interval = probability_of_improvement(measure(one), measure(other), rng=rng)
-        return Evidence(*interval, seeds=len(SEEDS))
+        return lower_evidence(measure(one), measure(other), rng)
 
     acrobot, slower, shallow = (
         f"Acrobot, {v}" for v in ("as reported", "gamma 0.9", "one hidden layer")
@@ -275,7 +260,7 @@ def findings(curves: Curves) -> list[Finding]:
         three_b.judge(better(acrobot, slower, at_the_end), better(acrobot, slower, to_200)),
         three_c.judge(*about(two, 1_500)),
         three_d.judge(
-            _evidence(ratio, rng),
+            median_evidence(ratio, rng),
             Evidence(*proportion_interval(late, len(SEEDS)), seeds=len(SEEDS)),
         ),
         three_e.judge(better(acrobot, shallow, at_the_end)),
@@ -292,10 +277,3 @@ def steps_ratio(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """
     with np.errstate(invalid="ignore"):
         return np.where(np.isinf(one) & np.isinf(other), 1.0, one / other)
-
-
-def _evidence(values: np.ndarray, rng: np.random.Generator) -> Evidence:
-    """Median with its interval; nothing is known of no seeds."""
-    if len(values) == 0:
-        return Evidence.none()
-    return Evidence(*bootstrap_interval(values, rng=rng), seeds=len(values))

@@ -7,12 +7,12 @@ import argparse
 import csv
 import os
 import shutil
-import subprocess
 import sys
 from math import ceil
 from pathlib import Path
 
 import pictures
+from stamp import run
 
 ROOT = Path(__file__).parents[2]
 FULL = 30
@@ -101,7 +101,7 @@ def build(seeds: int, only: list[str]) -> int:
     if only or seeds != FULL:
         source = copied(target / "_build" / "source", preview=seeds != FULL, only=only)
     command = ["jupyter-book", "build", str(source), "--path-output", str(target)]
-    code = subprocess.call(command if only else [*command, *STRICT])
+    code = run(command if only else [*command, *STRICT])
     lost = [] if code else pictures.missing(source / "book", target / "_build" / "html" / "book")
     print("\n".join(lost), file=sys.stderr)
     if only and not code:
@@ -117,7 +117,7 @@ def main() -> int:
     try:
         return build(int(os.environ.get("SEEDS") or FULL), only)
     except KeyboardInterrupt:
-        print("\nInterrupted; what is finished is kept. A first look: make book SEEDS=3")
+        print("Interrupted; what is finished is kept. A first look: make book SEEDS=3", flush=True)
         return 130
 
 

@@ -41,6 +41,16 @@ def digest(paths: Iterable[Path], also: str = "") -> str:
     return total.hexdigest()
 
 
+def run(command: list[str]) -> int:
+    """Run a command and return its exit code; if interrupted, let it end by itself first."""
+    with subprocess.Popen(command) as process:
+        try:
+            return process.wait()
+        except KeyboardInterrupt:  # the command got it too
+            process.wait()
+            raise
+
+
 def main(arguments: list[str]) -> int:
     """Run the command if it is due, and stamp what it made; return its exit code."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -54,8 +64,8 @@ def main(arguments: list[str]) -> int:
         return 0
     given.stamp.unlink(missing_ok=True)
     try:
-        code = subprocess.call(given.command)
-    except KeyboardInterrupt:  # the command got it too, and has said what there is to say
+        code = run(given.command)
+    except KeyboardInterrupt:
         return 130
     if code == 0:
         given.stamp.parent.mkdir(parents=True, exist_ok=True)

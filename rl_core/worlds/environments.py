@@ -282,7 +282,14 @@ def opened(env: Any) -> gymnasium.Env[Any, Any]:
     """
     if isinstance(env, str | Make):
         return make_environment(env)
-    made = env() if callable(env) and not isinstance(env, gymnasium.Env) else env
+    made = env
+    if callable(env) and not isinstance(env, gymnasium.Env):
+        try:
+            made = env()
+        except TypeError as error:
+            raise TypeError(
+                f"env must be a function without arguments, got {env!r}: {error}"
+            ) from (error)
     if not isinstance(made, gymnasium.Env):
         raise TypeError(
             "env must be a Gymnasium id, an import path, a task, an environment or a function that "

@@ -9,7 +9,8 @@ A task is a class with three functions, given to the decorator `task`:
 `state` is a float64 vector of the length that the task declares, `observation` a float32 vector,
 `action` a float32 vector: the continuous action, or, of length 1, the index of a discrete one.
 The functions are compiled when they are first needed; they may call others that are compiled with
-`rl_core.kernels.compiled.compiled` or `numba.njit`. Constants of their module are frozen as they then are.
+`rl_core.kernels.compiled.compiled` or `numba.njit`. Constants of their module are frozen as they
+then are.
 
 A loop takes a `Kernel`. Its functions have one type for all tasks, the signatures above, so that a
 loop is compiled once and then plays every task, also those that were written after it.
