@@ -15,12 +15,14 @@ Two kinds of seeds are fresh, which means that nobody had looked at them when th
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 import pandas as pd
 
-from report.claims import Claim, Criterion, Evidence, Finding, Reading
+from report.claims import Claim, Criterion, Evidence, Finding, Reading, sensitivity
 from report.figure_data import tidy
 from report.seeds import FULL, SEEDS
 from rl_core.experiments import Arm, Results, run
@@ -46,6 +48,7 @@ MILESTONES = (1_000, 1_500, 2_000)
 FRESH = range(100, 100 + len(SEEDS))
 NEAR_A_BOUND = range(100, 100 + 100 * len(SEEDS) // FULL)
 SHORT = 1_000_000  # environment steps, where that is enough to see what becomes of a seed
+TORCH_EPISODES = 300
 RUN_AWAY = 500_000  # steps: a seed with an episode longer than this has run away
 PAIRED = "against as reported at 2,000, same seed"
 REPORTED_AT = {"Acrobot": 1_000, "MountainCar": 1_500}  # the episodes of the report's numbers
@@ -297,8 +300,98 @@ def _interval(interval: tuple[float, float, float]) -> str:
     return "{} [{}, {}]".format(*texts)
 
 
+def trial_table(fresh: Curves, near: Curves) -> pd.DataFrame:
+    """One row an arm on fresh seeds: who learned, steps at the end, who ran away or stopped."""
+    rng = np.random.default_rng(np.random.SeedSequence(2022))
+    rows = []
+    for curves in (fresh, near):
+        for arm, raw in curves.raw.items():
+            row = {"arm": arm, "seeds": len(raw), "learned": int(curves.learned(arm).sum())}
+            ends = bootstrap_interval(curves.at(arm, EPISODES), rng=rng)
+            row[f"steps at {EPISODES:,}"] = _interval(ends)
+            row["ran away"] = int(ran_away(curves, arm).sum())
+            row["out of budget"] = int(np.isnan(raw[:, -1]).sum())
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def question_table(evidence: Sequence[Evidence]) -> pd.DataFrame:
+    """What the trials were to tell, and what they told."""
+    return pd.DataFrame(
+        [
+            {"question": one.text, "measured": str(found), "met": one.answer(found)}
+            for one, found in zip(QUESTIONS, evidence, strict=True)
+        ]
+    )
+
+
+def windows(curves: Curves, near: Curves) -> pd.DataFrame:
+    """What becomes of 3a and 3c where "about" means more, or less, than a quarter."""
+    rng = np.random.default_rng(np.random.SeedSequence(2023))
+    parts = []
+    for claim, of, name, about in (
+        ("3a", near, "Acrobot", 100),
+        ("3c", curves, "MountainCar", 180),
+    ):
+        steps = of.at(f"{name}, as reported", REPORTED_AT[name])
+        part = sensitivity(about, steps, _evidence(steps, rng))
+        part.insert(0, "claim", claim)
+        parts.append(part)
+    return pd.concat(parts, ignore_index=True)
+
+
+def ends(curves: Curves, arms: Sequence[str]) -> pd.DataFrame:
+    """Steps at the end, a row an arm and seed; infinite where a seed had stopped."""
+    return pd.concat(
+        pd.DataFrame({"arm": arm, "seed": curves.seeds, "steps": curves.at(arm, EPISODES)})
+        for arm in arms
+    )
+
+
+def same_seed(store: Path, seed: int) -> Results:
+    """Train one seed on Acrobot twice: compiled, and in torch."""
+    arms = [
+        replace(arm("Acrobot", engine, engine=engine), episodes=TORCH_EPISODES, snapshots=())
+        for engine in ("compiled", "torch")
+    ]
+    return run(arms, seeds=[seed], store=store)
+
+
+def each_seed(table: pd.DataFrame, arm: str) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Episodes and smoothed steps of each seed of an arm."""
+    rows = table[table["arm"] == arm]
+    return [
+        (of["episode"].to_numpy(), of["steps"].rolling(WINDOW, min_periods=1).median().to_numpy())
+        for _, of in rows.groupby("seed")
+    ]
+
+
+def parting(results: Results) -> int:
+    """The first episode in which two arms' steps differ; the last if none does."""
+    one, other = (rows["steps"].to_numpy() for _, rows in results.table.groupby("arm"))
+    length = min(len(one), len(other))
+    return int(np.append(np.flatnonzero(one[:length] != other[:length]), length - 1)[0]) + 1
+
+
+def sees_all(env: str, steps: int = 1_000) -> float:
+    """How far a world that starts from what is seen drifts from the world that is seen, at most.
+
+    A second copy is set to the first one's observation before every step, and both take the same
+    random action. If what is seen is all there is, the two differ by rounding only.
+    """
+    one, other = (gym.make(env, max_episode_steps=-1).unwrapped for _ in range(2))
+    seen, _ = one.reset(seed=0)
+    other.reset(seed=0)
+    furthest = 0.0
+    for action in np.random.default_rng(0).integers(3, size=steps):
+        other.state = tuple(map(float, seen))
+        seen, beside = (world.step(int(action))[0] for world in (one, other))
+        furthest = max(furthest, float(np.abs(seen - beside).max()))
+    return furthest
+
+
 def wall_clock(results: Results, reported_minutes: dict[str, float]) -> pd.DataFrame:
-    """Seconds one seed took, here and in the report."""
+    """Seconds one seed took: here those of the processor, in the report by the clock."""
     made = results.provenance
     rows = []
     for name, minutes in reported_minutes.items():
@@ -307,18 +400,26 @@ def wall_clock(results: Results, reported_minutes: dict[str, float]) -> pd.DataF
             {
                 "experiment": f"{name}, REINFORCE, one seed",
                 "2018 (s)": 60 * minutes,
-                "now (s, mean)": of_arm["seconds"].mean(),
-                "now, all seeds (s)": of_arm["seconds"].sum(),
+                "now (s, mean)": of_arm["processor_seconds"].mean(),
+                "now, all seeds (s)": of_arm["processor_seconds"].sum(),
                 "processor": of_arm["processor"].iloc[0],
             }
         )
     return pd.DataFrame(rows)
 
 
-def median_seed(curves: Curves, arm: str) -> int:
-    """The seed in the middle when all are ordered by their steps at the end: a rule, not a pick."""
+def shown_seeds(curves: Curves, arm: str) -> dict[str, int]:
+    """Places of the seeds to show, by a rule: best, middle and worst at the end, first to fail.
+
+    The middle is that of all seeds, the worst that of those that learned.
+    """
     order = np.argsort(curves.at(arm, EPISODES), kind="stable")
-    return int(SEEDS[order[(len(order) - 1) // 2]])
+    good = curves.learned(arm)
+    learners = [place for place in order if good[place]]
+    places = {"best": order[0], "middle": order[(len(order) - 1) // 2]}
+    places |= {"worst that learned": learners[-1]} if learners else {}
+    places |= {"failed": np.flatnonzero(~good)[0]} if not good.all() else {}
+    return {text: int(place) for text, place in places.items()}
 
 
 def better(one: np.ndarray, other: np.ndarray, rng: np.random.Generator) -> Evidence:
