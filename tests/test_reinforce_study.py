@@ -1,5 +1,7 @@
 """Chapter 3's measures, on made-up curves with known answers: no failure is left out."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -108,3 +110,36 @@ def test_seeds_are_compared_with_themselves():
 @pytest.mark.parametrize(("interval", "text"), [((-3.0, -np.inf, 4.0), "−3 [−∞, 4]")])
 def test_intervals_have_signs(interval, text):
     assert study._interval(interval) == text
+
+
+def test_what_is_seen_of_the_cars_is_all_there_is():
+    assert study.sees_all("MountainCar-v0", steps=200) < 1e-6
+
+
+def test_engines_part_where_their_steps_first_differ():
+    def parting(*steps):
+        rows = [
+            pd.DataFrame({"arm": arm, "episode": np.arange(1, 4), "steps": of})
+            for arm, of in zip(("compiled", "torch"), steps, strict=True)
+        ]
+        return study.parting(SimpleNamespace(table=pd.concat(rows)))
+
+    assert parting([5, 6, 7], [5, 8, 7]) == 2
+    assert parting([5, 6, 7], [5, 6, 7]) == 3
+
+
+def ending(*steps):
+    """Curves that end at given steps."""
+    ends = np.array(steps)
+    return SimpleNamespace(at=lambda arm, episode: ends, learned=lambda arm: ends <= study.LEARNED)
+
+
+def test_seeds_to_show_are_chosen_by_rule():
+    shown = study.shown_seeds(ending(300, np.inf, 100, 200, np.inf), "")
+    assert shown == {"best": 2, "middle": 0, "worst that learned": 0, "failed": 1}
+    assert study.shown_seeds(ending(9, 5), "") == {
+        "best": 1,
+        "middle": 1,
+        "worst that learned": 0,
+    }
+    assert study.shown_seeds(ending(np.inf, np.inf), "")["failed"] == 0
