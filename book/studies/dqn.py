@@ -123,15 +123,17 @@ def learn(store: Path) -> Results:
     return run(arms(), seeds=SEEDS, store=store)
 
 
-def steps_a_goal(episodes: pd.DataFrame, name: str, start: float = 0.75, end: float = 1.0) -> float:
+def steps_a_goal(
+    episodes: pd.DataFrame, budget: int, start: float = 0.75, end: float = 1.0
+) -> float:
     """Environment steps of a part of the budget, divided by the goals reached in it.
 
     Parameters
     ----------
     episodes : pandas.DataFrame
         The rows of one seed.
-    name : str
-        The environment.
+    budget : int
+        Environment steps of the seed.
     start, end : float
         The part, as shares of the budget; the last quarter unless told.
 
@@ -140,7 +142,7 @@ def steps_a_goal(episodes: pd.DataFrame, name: str, start: float = 0.75, end: fl
     float
         Infinity if no goal was reached. Episodes that were stopped count with their steps.
     """
-    low, high = start * BUDGET[name], end * BUDGET[name]
+    low, high = start * budget, end * budget
     at = episodes["env_steps"][episodes["terminated"]]
     goals = int(((at > low) & (at <= high)).sum())
     return (high - low) / goals if goals else np.inf
@@ -292,9 +294,9 @@ class Curves:
 
     def steps_a_goal(self, arm: str, start: float = 0.75, end: float = 1.0) -> np.ndarray:
         """Steps a goal of each seed in a part of the budget."""
-        name, rows = arm.partition(",")[0], self.table[arm]
+        budget, rows = BUDGET[arm.partition(",")[0]], self.table[arm]
         of_seed = dict(list(rows.groupby("seed")))
-        return np.array([steps_a_goal(of_seed[seed], name, start, end) for seed in SEEDS])
+        return np.array([steps_a_goal(of_seed[seed], budget, start, end) for seed in SEEDS])
 
     def parts(self, arm: str) -> np.ndarray:
         """Steps a goal of each seed in each tenth of the budget, of shape (seeds, tenths)."""
@@ -393,12 +395,23 @@ def random_share(config: DQNConfig, epsilon: float) -> float:
     return steps / (steps + 1 - epsilon)
 
 
-def greedy_steps(results: Results, arm: str, episodes: int = 20, limit: int = 1_000) -> np.ndarray:
-    """Median steps of each seed's greedy policy after learning; infinite if most do not arrive."""
+def greedy_steps(
+    results: Results,
+    arm: str,
+    *,
+    epsilon: float = 0.0,
+    seeds: Sequence[int] = SEEDS,
+    episodes: int = 20,
+    limit: int = 1_000,
+) -> np.ndarray:
+    """Median steps of each seed's policy after learning; infinite if most do not arrive.
+
+    The policy is greedy, or takes a random action with probability `epsilon`.
+    """
     arrays, env = results.arrays(arm), ENV[arm.partition(",")[0]]
     medians = []
-    for position, seed in enumerate(SEEDS):
-        agent = of_values(weights_of(arrays, position))
+    for position, seed in enumerate(seeds):
+        agent = of_values(weights_of(arrays, position), epsilon)
         played = evaluate(env, agent, seed=seed, episodes=episodes, max_steps=limit)
         medians.append(played["steps"].where(played["terminated"], np.inf).median())
     return np.array(medians)

@@ -1,0 +1,75 @@
+"""Chapter 4's second round: its arms, its criteria, and the shaping by potentials."""
+
+import gymnasium as gym
+import numpy as np
+import pandas as pd
+import pytest
+
+from studies import dqn as first
+from studies import dqn_again as study
+from studies.potential import GAMMA, potential
+
+
+def test_the_potential_is_a_difference_but_for_the_wall():
+    """What is added is gamma Phi(s') - Phi(s), Phi being 0 at the goal; at the wall it is near."""
+    env = gym.make("MountainCar-v0").unwrapped
+    rng = np.random.default_rng(0)
+    before, _ = env.reset(seed=0)
+    arrived, walls = False, 0
+    while not arrived:  # with the velocity, and now and then anyhow
+        action = int(rng.integers(3)) if rng.random() < 0.2 else 2 * int(before[1] > 0)
+        after, reward, arrived, *_ = env.step(action)
+        difference = GAMMA * (0.0 if arrived else abs(after[0] + 0.5)) - abs(before[0] + 0.5)
+        hit = after[0] == np.float32(-1.2)
+        walls += hit
+        added = potential(after, reward) - reward
+        assert added == pytest.approx(difference, abs=0.07 if hit else 1e-6)
+        before = after
+    assert walls > 0
+
+
+def test_the_fresh_seeds_are_not_those_of_the_first_round():
+    assert set(study.FRESH).isdisjoint(range(100))
+    assert first.reported("MountainCar").gamma == GAMMA
+
+
+def test_each_arm_of_the_second_round_differs_by_what_its_name_says():
+    configs = {arm.name: vars(arm.config) for arm in study.arms()}
+    all_four = vars(first.mended("MountainCar", first.RIVALS))
+    biases = vars(first.mended("MountainCar", ("biases",)))
+    for name, base, changed in (
+        (study.LONG, biases, {"max_env_steps"}),
+        (study.NO_PERSISTENCE, all_four, {"persistence"}),
+        (study.NO_SCHEDULE, all_four, {"epsilon"}),
+        (study.SHAPED_MENDED, all_four, {"shaping"}),
+        (study.POTENTIAL_MENDED, all_four, {"shaping"}),
+    ):
+        assert {key for key in base if base[key] != configs[name][key]} == changed
+    assert set(study.CRITERIA) < set(configs)
+
+
+class Made:
+    """Results of a second round in which every episode of an arm takes as long."""
+
+    def __init__(self, steps):
+        self.table = pd.concat(
+            [
+                pd.DataFrame(
+                    {"arm": arm.name, "seed": seed, "steps": steps, "terminated": True}
+                ).assign(env_steps=lambda rows: rows["steps"].cumsum())
+                for arm in study.arms()
+                for seed in study.FRESH
+                for steps in [np.full(arm.config.max_env_steps // steps, steps)]
+            ]
+        )
+
+
+@pytest.mark.parametrize(("steps", "arrived", "met"), [(300, True, "yes"), (600, False, "no")])
+def test_a_criterion_is_met_by_the_share_of_seeds(monkeypatch, steps, arrived, met):
+    monkeypatch.setattr(study, "FRESH", tuple(range(100, 130)))
+    monkeypatch.setattr(study, "arrives", lambda results, arm: np.full(30, arrived))
+    rows = study.judged(Made(steps)).set_index("arm")
+    assert rows.loc[study.NO_SCHEDULE, "met"] == met
+    assert rows.loc[study.POTENTIAL_MENDED, "met"] == met
+    assert rows.loc[study.LONG, "met"] == {"yes": "no", "no": "yes"}[met]
+    assert rows.loc[study.LONG, "share"] == float(arrived)
