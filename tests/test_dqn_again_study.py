@@ -52,16 +52,13 @@ class Made:
     """Results of a second round in which every episode of an arm takes as long."""
 
     def __init__(self, steps):
-        self.table = pd.concat(
-            [
-                pd.DataFrame(
-                    {"arm": arm.name, "seed": seed, "steps": steps, "terminated": True}
-                ).assign(env_steps=lambda rows: rows["steps"].cumsum())
-                for arm in study.arms()
-                for seed in study.FRESH
-                for steps in [np.full(arm.config.max_env_steps // steps, steps)]
-            ]
-        )
+        tables = []
+        for arm in study.arms():
+            count = arm.config.max_env_steps // steps
+            rows = pd.DataFrame({"steps": [steps] * count}).assign(arm=arm.name, terminated=True)
+            rows["env_steps"] = rows["steps"].cumsum()
+            tables += [rows.assign(seed=seed) for seed in study.FRESH]
+        self.table = pd.concat(tables)
 
 
 @pytest.mark.parametrize(("steps", "arrived", "met"), [(300, True, "yes"), (600, False, "no")])
