@@ -6,7 +6,7 @@ arm of an environment the same budget of environment steps. Budgets, and the set
 changes, were chosen on seeds from 1000 on.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from report.claims import Claim, Criterion, Evidence, Finding
+from report.claims import Claim, Criterion, Evidence, Finding, sensitivity
 from report.seeds import SEEDS
 from rl_core.dqn import DQNConfig, dqn
 from rl_core.evaluation import evaluate, of_values
@@ -46,6 +46,7 @@ SHAPING = {
 PARTS = 10  # of a budget, in the curves of steps a goal
 WINDOW = 10  # episodes; "steps at episode k" is a seed's median over the last 10 up to k
 LEARNED = 500  # steps; as in chapter 3
+THRESHOLDS = (200, 250, LEARNED)  # steps a goal, to see what hangs on the choice
 MILESTONES = (20, 50, 100)
 REPORTED = {"Acrobot": 80, "MountainCar": 140}  # steps after 20 episodes
 SECONDS = {"Acrobot": 3, "MountainCar": 5}
@@ -310,8 +311,12 @@ class Curves:
 
 
 def _interval(interval: tuple[float, float, float]) -> str:
-    estimate, low, high = ("∞" if np.isinf(x) else f"{x:,.0f}" for x in interval)
+    estimate, low, high = (_steps(x) for x in interval)
     return f"{estimate} [{low}, {high}]"
+
+
+def _steps(value: float) -> str:
+    return "∞" if np.isinf(value) else f"{value:,.0f}"
 
 
 def milestones(curves: Curves) -> pd.DataFrame:
@@ -346,6 +351,103 @@ def to_the_budget(curves: Curves, variants: Sequence[str]) -> pd.DataFrame:
             row[f"{name}: learned"] = f"{count} of {len(SEEDS)} ({low:.0%} to {high:.0%})"
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def thresholds(of_arm: Mapping[str, np.ndarray]) -> pd.DataFrame:
+    """Count seeds by what a goal costs them: a row an arm, a column a threshold.
+
+    Parameters
+    ----------
+    of_arm : mapping of str to ndarray of shape (seeds,)
+        Steps a goal of each seed in the last quarter of the budget.
+
+    Examples
+    --------
+    >>> thresholds({"a": np.array([190.0, 400.0, np.inf])})
+      arm median  at most 200  at most 250  at most 500
+    0   a    400            1            1            2
+    """
+    rows = []
+    for arm, steps in of_arm.items():
+        counts = {f"at most {most}": int((steps <= most).sum()) for most in THRESHOLDS}
+        rows.append({"arm": arm, "median": _steps(np.median(steps)), **counts})
+    return pd.DataFrame(rows)
+
+
+def mended_alone_or_not(curves: Curves) -> pd.DataFrame:
+    """Seeds that learn when a cause alone is mended, and when all others are: a row a cause."""
+
+    def count(name: str, variant: str) -> str:
+        return f"{round(curves.share(f'{name}, {variant}')[0] * len(SEEDS))} of {len(SEEDS)}"
+
+    rows = [
+        {"cause": rival}
+        | {f"{name}: it alone": count(name, f"original, {rival}") for name in reversed(ENV)}
+        | {f"{name}: all but it": count(name, f"original, all but {rival}") for name in ENV}
+        for rival in RIVALS
+    ]
+    ends = {"none": "original", "all four": "original, all four"}
+    rows += [
+        {"cause": text} | {f"{name}: it alone": count(name, variant) for name in ENV}
+        for text, variant in ends.items()
+    ]
+    order = ["cause", *(f"{name}: {way}" for name in ENV for way in ("it alone", "all but it"))]
+    return pd.DataFrame(rows, columns=order).fillna("")
+
+
+def goals(curves: Curves, arm: str) -> tuple[int, int]:
+    """Return how many seeds saw the goal in their whole budget, and how often all of them did."""
+    of_seed = curves.table[arm].groupby("seed")["terminated"].sum()
+    return int((of_seed > 0).sum()), int(of_seed.sum())
+
+
+def as_trained(results: Results) -> dict[str, dict[float, np.ndarray]]:
+    """Steps of the reported arms' last networks in fresh episodes, by arm and epsilon."""
+    names = [f"{name}, as reported" for name in ENV]
+    return {
+        arm: {epsilon: greedy_steps(results, arm, epsilon=epsilon) for epsilon in (0.0, 0.1)}
+        for arm in names
+    }
+
+
+def about(curves: Curves) -> pd.DataFrame:
+    """What becomes of 3f and 3g where "about" means more, or less."""
+    rng = np.random.default_rng(np.random.SeedSequence(2022))
+    tables = []
+    for claim, (name, steps) in zip(("3f", "3g"), REPORTED.items(), strict=True):
+        at_20 = curves.at(f"{name}, as reported", MILESTONES[0])
+        table = sensitivity(steps, at_20, _evidence(at_20, rng))
+        tables.append(table.assign(claim=claim, about=steps))
+    columns = ["claim", "about", "window", "low", "high", "share", "answer"]
+    return pd.concat(tables, ignore_index=True)[columns]
+
+
+def within(curves: Curves, arm: str, low: float, high: float) -> list[int]:
+    """Seeds of a reported arm whose steps lie between two bounds, at each milestone."""
+    at = (curves.at(arm, episode) for episode in MILESTONES)
+    return [int(((low <= steps) & (steps <= high)).sum()) for steps in at]
+
+
+def engines(name: str, seed: int, store: Path) -> Results:
+    """Train one seed of a reported arm twice: compiled, and by the statement in torch."""
+    config = reported(name)
+    both = [
+        Arm(engine, dqn, ENV[name], replace(config, engine=engine), EPISODES)
+        for engine in ("compiled", "torch")
+    ]
+    return run(both, seeds=[seed], store=store)
+
+
+def same_at_first(one: np.ndarray, other: np.ndarray) -> int:
+    """Episodes from the first one on that took as many steps in two runs.
+
+    Examples
+    --------
+    >>> same_at_first(np.array([9, 8, 7]), np.array([9, 8, 6]))
+    2
+    """
+    different = np.flatnonzero(one != other)
+    return int(different[0]) if len(different) else len(one)
 
 
 def shares(curves: Curves, variants: Sequence[str]) -> pd.DataFrame:
@@ -444,7 +546,7 @@ def median_seed(curves: Curves, arm: str) -> int:
 
 
 def premises(curves: Curves) -> dict[str, bool]:
-    """The sentences with which the chapter ends, and whether the shares of seeds bear them out."""
+    """The sentences of the chapter that lean on the data, and whether the seeds bear them out."""
 
     def share(name: str, variant: str) -> float:
         return curves.share(f"{name}, {variant}")[0]
@@ -465,6 +567,56 @@ def premises(curves: Curves) -> dict[str, bool]:
         "Without replay no more seeds learn, mended or not.": all(
             without <= with_it for with_it, without in replayed
         ),
+        "Without the flag Acrobot is learned.": (
+            share("Acrobot", "original, all but terminal flag") >= 0.75
+        ),
+        "All but the memory is needed on MountainCar.": (
+            max(car(f"original, all but {one}") for one in NOT_MEMORY) <= 0.25
+            and car("original, all but long memory") >= 0.75
+        ),
+    }
+
+
+def premises_of_figure_13(curves: Curves) -> dict[str, bool]:
+    """What is said of the car after its milestone."""
+    arm = "MountainCar, as reported"
+    good = [int((curves.at(arm, episode) <= LEARNED).sum()) for episode in MILESTONES]
+    middle = [float(np.median(curves.at(arm, episode))) for episode in MILESTONES]
+    return {
+        "The car's steps rise again after the milestone.": middle[0] < middle[1] < middle[2],
+        "Some seeds lose what they had learned.": good[2] < good[0],
+    }
+
+
+def premises_of_tricks(curves: Curves) -> dict[str, bool]:
+    """What is said of the discount, of replay and of the fixed target."""
+
+    def count(name: str, trick: str) -> float:
+        return curves.share(f"{name}, {trick}")[0]
+
+    car, swing = partial(count, "MountainCar"), partial(count, "Acrobot")
+    without = {one: curves.steps_a_goal(f"MountainCar, shaped{one}") for one in ("", ", gamma 0.9")}
+    return {
+        "More seeds learn to drive with a discount of 0.9, and better.": (
+            car("shaped") < car("shaped, gamma 0.9")
+            and np.median(without[", gamma 0.9"]) < np.median(without[""])
+        ),
+        "Fewer seeds learn to drive without replay.": car("shaped, no replay") < car("shaped"),
+        "The fixed target matters most on MountainCar.": (
+            car("shaped") - car("shaped, no fixed target")
+            > swing("shaped") - swing("shaped, no fixed target")
+        ),
+    }
+
+
+def premises_of_replay(curves: Curves) -> dict[str, bool]:
+    """What is said of how often the goal is seen where nothing is mended."""
+    seen, met = goals(curves, "MountainCar, original")
+    seen_without, met_without = goals(curves, "MountainCar, original, no replay")
+    return {
+        "Unmended, agents without replay see the flag more often.": (
+            seen < seen_without and met < met_without
+        )
     }
 
 

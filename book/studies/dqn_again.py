@@ -139,3 +139,11 @@ def judged(results: Results) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
+
+
+def premises(second: pd.DataFrame) -> dict[str, bool]:
+    """The sentences on the second round, and whether its seeds bear them out."""
+    met = second.set_index("arm")["met"]
+    return {
+        f"Answered: {CRITERIA[arm].text}": met[arm] in ("yes", "no", "open") for arm in CRITERIA
+    }
