@@ -5,6 +5,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from report.claims import Evidence
 from studies import dqn as first
 from studies import dqn_again as study
 from studies.potential import GAMMA, potential
@@ -70,3 +71,26 @@ def test_a_criterion_is_met_by_the_share_of_seeds(monkeypatch, steps, arrived, m
     assert rows.loc[study.POTENTIAL_MENDED, "met"] == met
     assert rows.loc[study.LONG, "met"] == {"yes": "no", "no": "yes"}[met]
     assert rows.loc[study.LONG, "share"] == float(arrived)
+
+
+@pytest.mark.parametrize(
+    ("arm", "share", "word"),
+    [
+        (study.LONG, 0.9, "time"),
+        (study.NO_PERSISTENCE, 0.7, "Persistence"),
+        (study.NO_SCHEDULE, 0.1, "Persistence"),
+        (study.SHAPED_MENDED, 0.6, "flag"),
+        (study.POTENTIAL_MENDED, 0.2, "Potentials"),
+    ],
+)
+def test_each_sentence_on_the_second_round_falls_with_its_arm(arm, share, word):
+    shares = dict(zip(study.CRITERIA, (0.1, 0.2, 1.0, 0.1, 0.8), strict=True))
+    bearing = pd.DataFrame({"arm": list(shares), "share": shares.values(), "met": "yes"})
+    assert all(study.premises(bearing).values())
+    changed = bearing.set_index("arm")
+    met = study.CRITERIA[arm].answer(Evidence(share, share, share, seeds=30))
+    changed.loc[arm, ["share", "met"]] = share, met
+    held = study.premises(changed.reset_index())
+    assert [sentence for sentence, holds in held.items() if not holds] == [
+        sentence for sentence in held if word in sentence
+    ]

@@ -196,6 +196,20 @@ def _of(held, word):
     return next(holds for sentence, holds in held.items() if word in sentence)
 
 
+def test_what_is_said_of_the_car_falls_with_its_steps_and_goals(monkeypatch):
+    monkeypatch.setattr(study, "SEEDS", range(12))
+    tables = {arm.name: arm_rows(arm.name) for arm in study.arms()}
+    curves = study.Curves(pd.concat(tables.values()))
+    assert not any(study.premises_of_figure_13(curves).values())  # 900 steps from first to last
+    assert not any(study.premises_of_replay(curves).values())  # more goals with replay than without
+    worse = tables["MountainCar, as reported"]
+    worse["steps"] = 100 + 6 * worse["episode"]
+    tables["MountainCar, original"] = tables["MountainCar, original"].query("seed < 4")
+    curves = study.Curves(pd.concat(tables.values()))
+    assert all(study.premises_of_figure_13(curves).values())
+    assert all(study.premises_of_replay(curves).values())
+
+
 def test_seeds_are_counted_by_thresholds_and_windows(monkeypatch):
     monkeypatch.setattr(study, "SEEDS", range(12))
     curves = study.Curves(pd.concat([arm_rows(arm.name) for arm in study.arms()]))

@@ -143,7 +143,15 @@ def judged(results: Results) -> pd.DataFrame:
 
 def premises(second: pd.DataFrame) -> dict[str, bool]:
     """The sentences on the second round, and whether its seeds bear them out."""
-    met = second.set_index("arm")["met"]
+    rows = second.set_index("arm")
+    share, met = rows["share"], rows["met"]
     return {
-        f"Answered: {CRITERIA[arm].text}": met[arm] in ("yes", "no", "open") for arm in CRITERIA
+        "More time alone does not mend it.": met[LONG] == "yes",
+        "Persistence is what counts, and not the schedule.": (
+            met[NO_SCHEDULE] == "yes" and share[NO_PERSISTENCE] <= 0.5 * share[NO_SCHEDULE]
+        ),
+        "With the flag, the report's shaping teaches not to arrive.": met[SHAPED_MENDED] == "yes",
+        "Potentials leave the goal what it was.": (
+            met[POTENTIAL_MENDED] == "yes" and share[SHAPED_MENDED] < share[POTENTIAL_MENDED]
+        ),
     }
