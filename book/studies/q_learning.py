@@ -257,7 +257,7 @@ CLAIMS = (
                 ),
             ),
         ),
-        amended="the first criterion, open on seeds 0 to 29, is judged on seeds 100 to 699",
+        amended="the first criterion, open on seeds 0 to 29, is judged on seeds 100 to 279",
     ),
     Claim(
         "2h",

@@ -18,8 +18,8 @@ from studies import q_learning as study
 from studies.q_learning_world import GAMMA, World
 
 CHOOSING = range(1_000, 1_000 + len(SEEDS))
-JUDGING = range(100, 100 + 3 * len(SEEDS))
-MANY = range(100, 100 + 20 * len(SEEDS))
+JUDGING = range(100, 100 + 2 * len(SEEDS))
+MANY = range(100, 100 + 6 * len(SEEDS))
 """For claim 2g, whose arm with constant 0.9 falls into two bundles of seeds."""
 PROBABILITIES = {
     x: study.arm(f"exploitation {x:g}", exploration=study.EpsilonGreedy(round(1 - x, 6)))
