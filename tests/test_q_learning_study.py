@@ -164,12 +164,6 @@ def test_the_claims_are_judged_from_the_measures(world):
     assert found["2i"].answers == ("yes", "no")
 
 
-def test_how_many_seeds_tell_a_share_from_one_half():
-    assert study.seeds_to_separate(12, 30) == 93  # 1.96^2 x 0.24 / 0.01 = 92.2
-    assert study.seeds_to_separate(18, 30) == 93
-    assert study.seeds_to_separate(15, 30) == 0
-
-
 def test_a_curve_has_settled_once_it_stays_near_its_end():
     norms = np.full((3, study.EPISODES), 8.0)
     norms[:, :40] = 20.0

@@ -363,18 +363,6 @@ def levels(world: World, norms: np.ndarray) -> pd.DataFrame:
     return pd.DataFrame({"above_plateau": after - world.plateau, "change": after - before})
 
 
-def seeds_to_separate(stuck: int, seeds: int) -> int:
-    """From how many seeds on a share as measured would differ from one half, for all a test knows.
-
-    The 95% interval of a share p from n seeds is p +- 1.96 sqrt(p (1 - p) / n); it leaves out one
-    half from n = 1.96^2 p (1 - p) / (p - 1/2)^2 on. A share of one half would never differ: 0.
-    """
-    share = stuck / seeds
-    if share == 0.5:
-        return 0
-    return int(np.ceil(1.96**2 * share * (1 - share) / (share - 0.5) ** 2))
-
-
 def settled(norms: np.ndarray, within: float = 0.05) -> int:
     """The episode from which on the median of the seeds stays this close to its level at the end.
 
