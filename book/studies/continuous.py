@@ -479,7 +479,7 @@ def findings(curves: Curves, fresh: Curves) -> list[Finding]:
 
     def on_fresh_seeds(one: str, other: str, measure: Callable[[str], np.ndarray]) -> Evidence:
         better, worse = (measure(arm)[fresh.learned(arm)] for arm in (one, other))
-        return _probability(better, worse, np.random.default_rng(np.random.SeedSequence(2023)))
+        return lower_evidence(better, worse, np.random.default_rng(np.random.SeedSequence(2023)))
 
     def loss(arm: str) -> np.ndarray:
         return -fresh.final_return(arm)

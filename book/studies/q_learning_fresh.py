@@ -1,7 +1,8 @@
 """Chapter 2 on other seeds: readings that need them, and a second target to compare with figure 9.
 
 What is chosen by its data is chosen on seeds from 1,000 on and judged on seeds from 100 on. The
-numbers of seeds were fixed before any of them was run.
+numbers of seeds were cut once, for want of time, when a few may have been run and no result had
+been read (`report.amendments`).
 """
 
 from collections.abc import Mapping
