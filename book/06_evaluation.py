@@ -145,8 +145,8 @@ drawings.all_agents(policies, published)
 # {glue:text}`car-limited-steps:.1f` million steps of training where the other sees {glue:text}`car-free-steps:.1f` million; on Acrobot it also learns from episodes that were cut off, which the
 # report's threw away; and on MountainCarContinuous it has 2,000 episodes, not 5,000. What the limit does by itself these arms do not tell.
 #
-# **What time limits do to evaluation.** Take an agent that gets to MountainCar's goal in 250 steps, every time. Without a limit its return is
-# −250. Under the limit of 200 steps each of its episodes is cut off, and its return is −200. That is also the return of a car that never
+# **What time limits do to evaluation.** Take an agent that gets to MountainCar's goal in 500 steps, every time. Without a limit its return is
+# −500. Under the limit of 200 steps each of its episodes is cut off, and its return is −200. That is also the return of a car that never
 # moves. The limit hides the difference between the two.
 #
 # **DQN needs its noise as well.** Its training comes down, by halves, to one action in ten drawn at random. Table 6.4 tries the same networks with
