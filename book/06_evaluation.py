@@ -386,7 +386,7 @@ captioned(
 # from 100 on, are the table's own.
 #
 # **What depends on the machine.** All seconds do. A slower processor makes them longer, and so does a neighbour that takes its share of the cache. The
-# first run of a worker also loads compiled code. The steps, updates and episodes do not depend on it. A ratio of then to now is therefore
+# first run of a worker also compiles the program, or loads it: with few seeds that is most of what is measured, with all of them the median leaves it out. The steps, updates and episodes do not depend on it. A ratio of then to now is therefore
 # no measure of the programs; and another machine can come to another verdict. How much slower would it have to be? The smallest ratio of medians in
 # Table 6.9 is {glue:text}`slack:.1f`: a machine slower by more than that would miss the report's time.
 #
