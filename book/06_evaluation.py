@@ -145,8 +145,8 @@ drawings.all_agents(policies, published)
 # {glue:text}`car-limited-steps:.1f` million steps of training where the other sees {glue:text}`car-free-steps:.1f` million; on Acrobot it also learns from episodes that were cut off, which the
 # report's threw away; and on MountainCarContinuous it has 2,000 episodes, not 5,000. What the limit does by itself these arms do not tell.
 #
-# **What time limits do to evaluation.** Take an agent that gets to MountainCar's goal in 250 steps, every time. Without a limit its return is
-# −250. Under the limit of 200 steps each of its episodes is cut off, and its return is −200. That is also the return of a car that never
+# **What time limits do to evaluation.** Take an agent that gets to MountainCar's goal in 500 steps, every time. Without a limit its return is
+# −500. Under the limit of 200 steps each of its episodes is cut off, and its return is −200. That is also the return of a car that never
 # moves. The limit hides the difference between the two.
 #
 # **DQN needs its noise as well.** Its training comes down, by halves, to one action in ten drawn at random. Table 6.4 tries the same networks with
@@ -386,7 +386,7 @@ captioned(
 # from 100 on, are the table's own.
 #
 # **What depends on the machine.** All seconds do. A slower processor makes them longer, and so does a neighbour that takes its share of the cache. The
-# first run of a worker also loads compiled code. The steps, updates and episodes do not depend on it. A ratio of then to now is therefore
+# first run of a worker also compiles the program, or loads it: with few seeds that is most of what is measured, with all of them the median leaves it out. The steps, updates and episodes do not depend on it. A ratio of then to now is therefore
 # no measure of the programs; and another machine can come to another verdict. How much slower would it have to be? The smallest ratio of medians in
 # Table 6.9 is {glue:text}`slack:.1f`: a machine slower by more than that would miss the report's time.
 #
