@@ -223,7 +223,7 @@ def test_claims_are_judged_by_the_numbers(monkeypatch):
 
 def test_without_a_seed_that_learned_nothing_is_claimed():
     curves = all_arms(lambda arm: 700)
-    nothing = study._probability(np.empty(0), np.ones(3), np.random.default_rng(0))
+    nothing = study.lower_evidence(np.empty(0), np.ones(3), np.random.default_rng(0))
     assert (nothing.low, nothing.high, nothing.seeds) == (0.0, 1.0, 0)
     table = study.tradeoff(curves)
     none = table[(table["arm"] == "sigma 1") & (table["measure"] == "steps")].iloc[0]
