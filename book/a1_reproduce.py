@@ -30,21 +30,25 @@
 #
 # ## Randomness
 #
-# A run is a pure function of environment, configuration, number of episodes and seed. From one `numpy.random.SeedSequence(seed)` four
-# independent streams are spawned: for the environment, for the actions, for the network (initial weights, order of the samples) and for the replay
-# memory. No global random state is read or changed. The same seed gives the same bits alone or among others, on one worker or
+# A run is a pure function of environment, configuration, number of episodes and seed. From one `numpy.random.SeedSequence(seed)` independent
+# streams are spawned. REINFORCE and DQN have four: for the environment, for the actions, for the network (initial weights, order of the samples) and for
+# the replay memory. Q-learning has six: start states, transitions and decisions, each for learning and for evaluation. An evaluation of chapter 6
+# has two more, for starts and for actions, which no training has touched. No global random state is read or changed. The same seed gives the same bits alone or among others, on one worker or
 # several, in one go or after having been killed; tests hold this to the bit. This copy of the book stands on the seeds 0 to {glue:text}`last-seed`. Whatever had to be chosen, such as
-# caps and budgets, was chosen on seeds from 1000 on.
+# caps and budgets, was chosen on seeds from 1000 on. What was changed with data known is judged on seeds from 100 on, which nobody had seen.
 #
 # ## Versions
 
 # %% tags=["hide-input"]
 from pathlib import Path
 
+import pandas as pd
 from myst_nb import glue
 
-from report import provenance
+from report import front_page, provenance
+from report.amendments import AMENDMENTS, told
 from report.captions import captioned
+from report.chance import chance
 from report.seeds import SEEDS
 
 glue("seeds", len(SEEDS), display=False)
@@ -74,6 +78,42 @@ captioned(
 
 # %% [markdown]
 # With configurations: {download}`provenance.csv <../results/provenance.csv>`.
+#
+# ## What was changed afterwards
+#
+# Criteria are fixed before their data are seen. Where one was changed later, or its evidence corrected, it stands here.
+
+# %% tags=["hide-input"]
+captioned(
+    pd.DataFrame(told(AMENDMENTS)),
+    "Table A.3. Every amendment of claims, criteria and evidence, in the order in which they were "
+    "made.",
+)
+
+# %% [markdown]
+# ## Many criteria
+#
+# Each criterion is held against a 95% interval. Such an interval misses what it is about once in twenty times, by chance alone. The more criteria,
+# the more of these misses.
+
+# %% tags=["hide-input"]
+claims = front_page.claims(RESULTS, pd.read_csv("data/claims.csv", dtype=str))
+counted = chance(claims)
+glue("criteria", counted.criteria, display=False)
+glue("deciding", counted.claims, display=False)
+glue("random", counted.random, display=False)
+glue("by-chance", counted.by_chance, display=False)
+glue("near", len(counted.near), display=False)
+captioned(
+    counted.near,
+    "Table A.4. Deciding criteria whose interval ends within a tenth of its width of their bound: "
+    "a few other seeds could have moved them.",
+)
+
+# %% [markdown]
+# The claims have {glue:text}`criteria` criteria in their first readings. Of each of the {glue:text}`deciding` claims one criterion decides, and {glue:text}`random` of these
+# rest on seeds. If each interval missed once in twenty times, {glue:text}`by-chance:.1f` of them would miss: about so many verdicts may be wrong, and nothing says
+# which. No interval is widened for that. Those nearest to their bound are the first to doubt: {glue:text}`near` are in Table A.4.
 #
 # ## What differs from 2018, and why
 #

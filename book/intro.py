@@ -64,8 +64,8 @@ HTML(front_page.claims_table(claims))
 
 # %% [markdown]
 # The table as {download}`claims.csv <../results/claims.csv>`. A claim holds if all its criteria are met by the whole of their 95%
-# intervals, and holds in part if only some are. If none is met and at least one is missed by its whole interval, it does not hold. Otherwise,
-# all intervals holding their bounds, the seeds are too few to tell. Where the report's words can fairly be read in two ways and the verdicts
+# intervals, and holds in part if only some are. If none is met and at least one is missed by its whole interval, it does not hold. Otherwise every
+# interval reaches to both sides of a bound: what we measured fits a yes and a no, and the seeds are too few to tell. Where the report's words can fairly be read in two ways and the verdicts
 # differ, it depends on the reading. Shown is the quantity that decides: of the first criterion that failed, or else of the one that is
 # nearest to its bound.
 #

@@ -21,7 +21,6 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from rl_core.checks import floats, generator, instance, integer, number, require
-from rl_core.episodes import Trajectory, play_episode
 from rl_core.kernels import likelihood, networks
 from rl_core.kernels.choices import EPSILON_GREEDY, choose
 from rl_core.kernels.compiled import compiled
@@ -30,6 +29,7 @@ from rl_core.policies import MLP, Gaussian
 from rl_core.reinforce import ReinforceConfig
 from rl_core.worlds.discretise import GriddedTask, start_gridded, step_gridded
 from rl_core.worlds.environments import EnvironmentLike, World, open_world
+from rl_core.worlds.episodes import Trajectory, play_episode
 
 SPAWN_KEY = (1_000,)
 """Names the streams of evaluation among a seed's; learners use small numbers."""

@@ -1,11 +1,13 @@
 """What tells one value from another: its one description in JSON, and the digest of that.
 
 Results are kept under a digest of everything that decides their bits. A configuration, or what an
-environment is registered with, comes into it through `describe`.
+environment is registered with, comes into it through `describe`; what a configuration names by
+import path, through `code_behind`.
 """
 
 import dataclasses
 import hashlib
+import importlib
 import json
 import math
 import sys
@@ -14,6 +16,8 @@ from functools import reduce
 from typing import Any
 
 import numpy as np
+
+from rl_core import sources
 
 
 def canonical_json(value: object) -> str:
@@ -125,3 +129,55 @@ def _place(name: str, thing: object, modules: set[str] | None) -> tuple[str, str
     if modules is not None:
         modules.add(module)
     return module, colon, path
+
+
+def imported(name: str, path: object) -> Any:
+    """Return what stands at the import path "module:attribute".
+
+    Raises
+    ------
+    TypeError, ValueError
+        With `name` for what is looked for: the path is no text, or nothing is there.
+
+    Examples
+    --------
+    >>> imported("shaping", "math:floor")(2.5)
+    2
+    >>> imported("shaping", "math:flour")
+    Traceback (most recent call last):
+    ValueError: shaping must be an import path 'module:name', got 'math:flour' (module 'math' ...
+    """
+    allowed = f"{name} must be an import path 'module:name', got {path!r}"
+    if not isinstance(path, str):
+        raise TypeError(allowed)
+    module, _, attribute = path.partition(":")
+    if not (module and attribute):
+        raise ValueError(allowed)
+    if module == "__main__":
+        raise ValueError(f"{allowed}; put it into a module of its own, where workers find it")
+    try:
+        found = importlib.import_module(module)
+        for part in attribute.split("."):
+            found = getattr(found, part)
+    except Exception as error:  # importing runs a module's code, which may raise anything
+        raise ValueError(f"{allowed} ({error})") from error
+    return found
+
+
+def code_behind(path: str) -> str:
+    """Return the SHA-256 of the module at an import path and of what it imports.
+
+    What is installed is named by its version instead.
+
+    Examples
+    --------
+    >>> len(code_behind("rl_core.maze:Maze"))
+    64
+    """
+    module = path.partition(":")[0]
+    if module.split(".")[0] == "rl_core" or sources.is_project(module):
+        found = repr(sorted(sources.code([module]).items()))
+    else:
+        top = importlib.import_module(module.partition(".")[0])
+        found = f"{module} {getattr(top, '__version__', '')}"
+    return hashlib.sha256(found.encode()).hexdigest()

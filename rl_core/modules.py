@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from rl_core.imports import imported
+from rl_core.identity import imported
 from rl_core.kernels import networks
 from rl_core.policies import MLP, Network
 

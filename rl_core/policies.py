@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rl_core.checks import fields, instance, integers, one_of, optional, positive, require, truth
-from rl_core.imports import code_behind, imported
+from rl_core.identity import code_behind, imported
 from rl_core.kernels.likelihood import Policy
 from rl_core.kernels.networks import trainable_mask, xavier_uniform
 

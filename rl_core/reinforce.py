@@ -34,7 +34,6 @@ from numpy.typing import NDArray
 
 from rl_core import modules
 from rl_core.checks import fields, instance, integer, number, one_of, optional, positive, truth
-from rl_core.episodes import ModuleActor, Trajectory, play_episode, with_constant
 from rl_core.kernels import likelihood
 from rl_core.kernels.compiled import compiled
 from rl_core.kernels.likelihood import Actor, Policy
@@ -50,6 +49,7 @@ from rl_core.policies import (
 )
 from rl_core.training import Progress, Run, Training, spawn_streams, train_seeds
 from rl_core.worlds.environments import EnvironmentLike, World, one_seed_of, open_world
+from rl_core.worlds.episodes import ModuleActor, Trajectory, play_episode, with_constant
 
 
 @dataclass(frozen=True)

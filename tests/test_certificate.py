@@ -5,11 +5,11 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from certificate import certify
 
 from rl_core.maze import Maze, random_maze
 from rl_core.mdp import MDP
 from rl_core.planning import policy_evaluation, policy_iteration, value_iteration
+from studies.certificate import certify
 
 TENTH, THIRD = Fraction(1, 10), Fraction(1, 3)
 COURSE = [TENTH, 9 * TENTH]

@@ -9,6 +9,7 @@ from rl_core.evaluation import mean_actions
 from rl_core.policies import MLP, Gaussian
 from rl_core.reinforce import ReinforceConfig
 from studies import continuous as study
+from studies import continuous_causes as causes
 from studies import continuous_fates as what_became
 
 EPISODES = 600
@@ -104,6 +105,84 @@ def test_a_seed_cut_by_its_budget_keeps_its_last_measures():
     assert not curves.learned("as reported", 500)[0]
 
 
+def test_a_seed_cut_by_its_budget_that_is_not_spared_has_stopped():
+    first = seed_rows("as reported", 0, [*[200] * 400, 50], CUT)
+    rows = pd.concat([first, made_up("as reported").query("seed > 0")])
+    assert study.Curves(rows).learned("as reported")[0]
+    strict = study.Curves(rows, spare=False)
+    assert not strict.learned("as reported")[0]
+    assert np.isinf(strict.at("as reported")[0])
+
+
+def test_curves_of_other_seeds():
+    rows = made_up("as reported")
+    fresh = study.Curves(rows.assign(seed=rows["seed"] + 100), range(100, 105))
+    own = study.Curves(rows)
+    for measure in ("learned", "at", "early", "spread"):
+        np.testing.assert_array_equal(
+            getattr(fresh, measure)("as reported"), getattr(own, measure)("as reported")
+        )
+
+
+def test_a_range_of_steps_relative_to_their_median():
+    steps = np.tile([100, 200, 300, 400], EPISODES // 4)
+    first = seed_rows("as reported", 0, steps, np.full(EPISODES, True))
+    curves = curves_of(first, made_up("as reported").query("seed > 0"))
+    low, middle, high = np.quantile(steps[-500:], [0.25, 0.5, 0.75])
+    found = curves.relative_spread("as reported")
+    assert found[0] == pytest.approx((high - low) / middle)
+    assert np.isinf(found[2:]).all()
+
+
+@pytest.mark.parametrize(
+    ("steps", "terminated", "gone"),
+    [
+        ([200] * 5, [True] * 5, False),
+        ([500_000, 200], [False, True], False),  # slow to begin, and never after
+        ([200, 150_000], [True, True], True),
+        ([200, 200, 150_000], [True, True, False], True),
+        ([200, 50_000], [True, False], False),  # cut by the budget
+        ([500_000], [False], False),  # never out
+    ],
+)
+def test_who_is_lost(monkeypatch, steps, terminated, gone):
+    monkeypatch.setattr(causes, "FRESH", range(1))
+    assert causes.lost(seed_rows("a", 0, steps, terminated)).tolist() == [gone]
+
+
+def test_one_update_that_loses_no_seed_is_found():
+    def arm(name, gone):
+        steps = [200, 150_000 if gone else 200]
+        return [seed_rows(name, seed, steps, [True, True]) for seed in causes.FRESH]
+
+    class Results:
+        table = pd.concat(
+            [rows for one in causes.arms() for rows in arm(one.name, "512" in one.name)]
+        )
+
+    table = causes.judge(Results)
+    assert table["met"].tolist() == ["yes"] * 4
+    assert table["lost, batches of 512"].tolist() == [len(causes.FRESH)] * 4
+    assert (table["lost, the other"] == 0).all()
+
+
+def test_a_driver_without_noise_to_speak_of_earns_what_the_flag_pays_less_its_force(monkeypatch):
+    monkeypatch.setattr(causes, "SIGMAS", (1e-3,))
+    monkeypatch.setattr(causes, "FORCES", (1.0,))
+    monkeypatch.setattr(causes, "TRIES", 3)
+    earned = causes.drivers()["return"].item()
+    assert 85 < earned < 92  # some hundred steps at a tenth each
+
+
+def test_profiles_and_parting_by_hand():
+    curves = curves_of(made_up("as reported"))
+    table = causes.profiles(curves, ("as reported",), np.array([100, 200, 1_000]))
+    assert table["share"].tolist() == [0, 1 / 5, 2 / 5]
+    one, other = pd.DataFrame({"steps": [3, 4, 5]}), pd.DataFrame({"steps": [3, 5]})
+    assert causes.parting({"a": one, "b": other}) == 2
+    assert causes.parting({"a": one, "b": one}) == 0
+
+
 def test_measures_by_hand():
     curves = curves_of(made_up("as reported"))
     np.testing.assert_array_equal(curves.learned("as reported"), [True, *[False] * 4])
@@ -130,18 +209,21 @@ def test_claims_are_judged_by_the_numbers(monkeypatch):
     monkeypatch.setattr(
         study.Curves, "at", lambda s, arm, k=None: at(s, arm, min(k or EPISODES, EPISODES))
     )
-    found = {finding.claim.id: finding for finding in study.findings(curves)}
+    found = {finding.claim.id: finding for finding in study.findings(curves, curves)}
     assert list(found) == ["4a", "4b", "4c", "4d", "4e", "4f"]
     assert found["4a"].answers[1] == "yes"
     assert found["4b"].answers == ("open",) * 4
     assert found["4c"].answers[1] == "yes"  # 0.5 converges, 1 does not
     assert found["4e"].answers[1:] == ("yes", "yes")
     assert found["4d"].evidence[2].estimate == 3 / 5
+    assert found["4e"].others[0].answers == (found["4e"].answers[0], "yes")  # fewer steps paid for
+    assert found["4f"].others[0].answers[1] == found["4f"].answers[1]
+    assert found["4c"].others[0].evidence[:2] == found["4c"].evidence[:2]
 
 
 def test_without_a_seed_that_learned_nothing_is_claimed():
     curves = all_arms(lambda arm: 700)
-    nothing = study._probability(np.empty(0), np.ones(3), np.random.default_rng(0))
+    nothing = study.lower_evidence(np.empty(0), np.ones(3), np.random.default_rng(0))
     assert (nothing.low, nothing.high, nothing.seeds) == (0.0, 1.0, 0)
     table = study.tradeoff(curves)
     none = table[(table["arm"] == "sigma 1") & (table["measure"] == "steps")].iloc[0]

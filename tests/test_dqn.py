@@ -1,4 +1,4 @@
-"""DQN: targets by hand, exact gradients, the memory, and what a run promises."""
+"""DQN: two learners in one loop, what a run promises, what is learned, and what is refused."""
 
 import dataclasses
 import json
@@ -11,17 +11,25 @@ import pandas as pd
 import pytest
 import torch
 from gymnasium import spaces
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from joblib import Parallel, delayed
+from odd_values import ODD, PLAIN, try_out
 from scipy import stats
+from toy_task import Corridor as CompiledCorridor
 
-from rl_core import epsilon, networks, q_update, replay
-from rl_core.dqn import DQNConfig, dqn
-from rl_core.episodes import spawn_streams
-from rl_core.epsilon import Decay, HalfWay
+from rl_core import modules
+from rl_core.dqn import DQNConfig, _make_learner, act, check_dqn, dqn, play
 from rl_core.experiments import Arm
 from rl_core.experiments import run as run_arms
-from rl_core.q_update import COPIES, DUE, NOTHING, Settings, make_learner
-from rl_core.worlds.shaping import Shaping, compiled_shape
+from rl_core.exploration import HalfWay, Linear, schedule_state
+from rl_core.kernels import networks
+from rl_core.kernels.q_update import STEPS, UPDATES, Settings, make_learner
+from rl_core.kernels.replay import make_memory
+from rl_core.policies import MLP, Module
+from rl_core.training import spawn_streams
+from rl_core.worlds.environments import TaskWorld, open_world
+from rl_core.worlds.shaping import Shaping, shape_for
 
 SMALL = DQNConfig(
     batch_size=40,
@@ -35,13 +43,35 @@ CONFIGS = {
     "MountainCar-v0": dataclasses.replace(
         SMALL,
         optimiser="adam",
-        biases=True,
+        network=MLP((10, 20), biases=True),
         persistence=7,
-        epsilon=Decay(1.0, 0.2, 500),
+        epsilon=Linear(1.0, 0.2, steps=500),
         shaping=Shaping("rl_core.worlds.shaping:distance_from_start"),
         bootstrap_through_end=True,
     ),
 }
+LINEAR = MLP((), biases=False)
+
+
+def table_of_weights(n_inputs, n_outputs):
+    """A module that is a table: one weight for each of the inputs and actions."""
+    return torch.nn.Linear(n_inputs, n_outputs, bias=False)
+
+
+def small_network(n_inputs, n_outputs):
+    """A perceptron as anyone would write it."""
+    layers = torch.nn.Linear(n_inputs, 10), torch.nn.ReLU(), torch.nn.Linear(10, n_outputs)
+    return torch.nn.Sequential(*layers)
+
+
+def one_too_many(n_inputs, n_outputs):
+    """Puts out a value for an action that there is not."""
+    return torch.nn.Linear(n_inputs, n_outputs + 1)
+
+
+def no_network(n_inputs, n_outputs):
+    """No module."""
+    return [n_inputs, n_outputs]
 
 
 class Corridor(gymnasium.Env):
@@ -152,217 +182,76 @@ def only(run, seeds, position):
     )
 
 
-# The memory
+# Two learners in one loop
 
 
-def filled(capacity, count):
-    """A memory in which transition i has the reward i."""
-    memory = replay.make_memory(capacity, 2)
-    for i in range(count):
-        s = np.full(2, i, np.float32)
-        replay.store(memory, s, i % 3, float(i), s + 1, i % 5 == 0)
-    return memory
+def both_learners(config, world):
+    """The compiled learner and torch's with the same weights, each with its memory."""
+    for engine in ("compiled", "torch"):
+        chosen = dataclasses.replace(config, engine=engine)
+        learner, _ = _make_learner(chosen, world, np.random.default_rng(0))
+        yield learner, make_memory(config.memory_size, world.n_observations)
 
 
-def test_the_newest_transitions_overwrite_the_oldest():
-    memory = filled(10, 25)
-    assert replay.held(memory) == 10
-    assert sorted(memory.rewards) == list(range(15, 25))
-    np.testing.assert_array_equal(memory.observations[:, 0], memory.rewards)
-    np.testing.assert_array_equal(memory.next_observations[:, 1], memory.rewards + 1)
-    np.testing.assert_array_equal(memory.actions, memory.rewards.astype(int) % 3)
-    np.testing.assert_array_equal(memory.ends, memory.rewards % 5 == 0)
+def play_one(world, learner, memory, config, max_steps):
+    world.seed(1)
+    shape = shape_for(config.shaping, world.n_observations)
+    rngs = np.random.default_rng(2), np.random.default_rng(3)
+    with modules.reproducible():
+        return play(world.stepper, learner, memory, shape, world.reset(), *rngs, max_steps)
 
 
-@pytest.mark.parametrize(("capacity", "count"), [(50, 20), (50, 50), (50, 73)])
-def test_sampling_is_uniform_over_what_is_held_and_over_nothing_else(capacity, count):
-    memory, slots = filled(capacity, count), np.empty(20_000, np.int64)
-    replay.sample(memory, np.random.default_rng(0).random(20_000), slots)
-    rewards, counts = np.unique(memory.rewards[slots], return_counts=True)
-    np.testing.assert_array_equal(rewards, np.arange(max(0, count - capacity), count))
-    assert stats.chisquare(counts).pvalue > 1e-3
+@pytest.mark.parametrize("name", CONFIGS)
+def test_both_learners_take_the_same_first_episode_to_the_bit(name):
+    """Ten updates included: from the 200th step on, every tenth."""
+    config = dataclasses.replace(CONFIGS[name], update_every=10, epsilon=0.3)
+    world, outcomes, memories = open_world(name), [], []
+    for learner, memory in both_learners(config, world):
+        outcomes.append(play_one(world, learner, memory, config, 290))
+        memories.append(memory)
+        assert learner.counts[STEPS] == 290
+        assert learner.counts[UPDATES] == 10
+    assert outcomes[0] == outcomes[1]
+    for compiled, stated in zip(memories[0][:5], memories[1][:5], strict=True):
+        np.testing.assert_array_equal(compiled, stated)
+    assert len(np.unique(memories[0].actions[:290])) == 3
 
 
-# Epsilon
-
-
-def test_the_report_s_exploration_by_hand():
-    state = epsilon.initial(HalfWay(0.9, 0.1))
-    course = []
-    for event in (epsilon.after_copy, epsilon.after_goal, epsilon.after_copy, epsilon.after_copy):
-        event(state)
-        epsilon.after_step(state, 10_000)
-        course.append(state[epsilon.VALUE])
-    np.testing.assert_allclose(course, [0.9, 0.5, 0.4, 0.35])
-    for _ in range(60):
-        epsilon.after_goal(state)
-    assert state[epsilon.VALUE] == pytest.approx(0.1)
-
-
-def test_decay_is_linear_and_then_constant_and_a_number_stays():
-    for schedule, expected in ((Decay(1.0, 0.2, 8), [1, 0.9, 0.6, 0.2, 0.2]), (0.3, [0.3] * 5)):
-        state = epsilon.initial(schedule)
-        found = []
-        for t in (0, 1, 4, 8, 100):
-            epsilon.after_step(state, t)
-            epsilon.after_copy(state)
-            epsilon.after_goal(state)
-            found.append(state[epsilon.VALUE])
-        np.testing.assert_allclose(found, expected)
-
-
-# Targets and gradients
-
-
-def settings(**changes):
-    defaults = Settings(0.9, 4, 1, 1, 10, 1, 1e-3, False, False)
-    return defaults._replace(**changes)
-
-
-def learner_of(sizes, batch_size, seed=0, adam=False):
-    parameters = networks.xavier_uniform(sizes, np.random.default_rng(seed))
-    parameters += np.random.default_rng(1).normal(0, 0.1, parameters.size).astype(np.float32)
-    return make_learner(
-        sizes, parameters, biases=True, adam=adam, batch_size=batch_size, schedule=0.1
+@pytest.mark.parametrize("name", CONFIGS)
+def test_both_engines_report_the_same_first_episode_and_start_from_the_same_weights(name):
+    config = dataclasses.replace(CONFIGS[name], learning_starts=380)
+    compiled, stated = (
+        dqn(name, dataclasses.replace(config, engine=engine), episodes=1, seeds=[3])
+        for engine in ("compiled", "torch")
     )
+    pd.testing.assert_frame_equal(compiled.table, stated.table, check_exact=True)
+    assert compiled.arrays.keys() == stated.arrays.keys()
+    for key, array in compiled.arrays.items():
+        np.testing.assert_allclose(array, stated.arrays[key], rtol=0, atol=1e-4)
+        assert not key.startswith("initial/") or np.array_equal(array, stated.arrays[key])
 
 
-@pytest.mark.parametrize("through_end", [False, True])
-def test_targets_by_hand_on_a_terminal_a_truncated_and_an_ordinary_transition(through_end):
-    """With one linear layer Q(s', a) = s' W: the values of s' = (1, 2) are 1, 9 and -1."""
-    _, theta = networks.pack({"layer0.weight": np.array([[1, -1, 3], [0, 5, -2]], np.float32)})
-    learner = make_learner((2, 3), theta, biases=True, adam=False, batch_size=3, schedule=0.1)
-    memory, following = replay.make_memory(5, 2), np.array([1, 2], np.float32)
-    shape = compiled_shape("rl_core.worlds.shaping:original")
-    way = settings(batch_size=3, through_end=through_end)
-    for terminated in (True, False, False):  # a truncated step is stored as any other
-        q_update.remember(
-            way, learner, memory, shape, np.ones(2, np.float32), 1, -1.0, following, terminated
-        )
-    learner.slots[:] = [0, 1, 2]
-    loss = q_update.loss_gradient(way, learner, memory)
-    found = [q_update.target(way, memory, slot) for slot in range(3)]
-    ordinary = -1.0 + 0.9 * 9.0
-    expected = [ordinary if through_end else -1.0, ordinary, ordinary]
-    np.testing.assert_allclose(found, expected)
-    assert loss == pytest.approx(np.mean((np.array(expected) - 4.0) ** 2))  # Q(s, 1) = -1 + 5
-
-
-@pytest.mark.parametrize("batch_size", [1, 32, 37, 512])
-def test_the_gradient_is_torch_s(batch_size):
-    sizes, rng = (6, 10, 20, 3), np.random.default_rng(3)
-    learner, memory = learner_of(sizes, batch_size), replay.make_memory(60, 6)
-    for _ in range(60):
-        s, following = rng.normal(size=(2, 6)).astype(np.float32)
-        replay.store(memory, s, rng.integers(3), rng.normal(), following, rng.random() < 0.3)
-    learner.fixed[:] += rng.normal(0, 0.1, learner.fixed.size).astype(np.float32)
-    replay.sample(memory, rng.random(batch_size), learner.slots)
-    loss = q_update.loss_gradient(settings(batch_size=batch_size), learner, memory)
-    online, fixed = (networks.to_torch(sizes, p) for p in (learner.parameters, learner.fixed))
-    part = [torch.from_numpy(array[learner.slots]) for array in memory[:5]]
-    s, following, actions, rewards, ends = part
-    with torch.no_grad():
-        y = rewards + 0.9 * fixed(following).max(1).values * ~ends
-    q = online(s).gather(1, actions[:, None])[:, 0]
-    expected = ((y - q) ** 2).mean()
-    expected.backward()
-    gradient = np.concatenate([p.grad.numpy().ravel() for p in online.parameters()])
-    assert loss == pytest.approx(expected.item(), rel=1e-5)
-    np.testing.assert_allclose(learner.gradient, gradient, atol=2e-5)
-
-
-def test_the_gradient_is_the_loss_s_by_finite_differences():
-    sizes, rng = (2, 5, 3), np.random.default_rng(4)
-    learner, memory = learner_of(sizes, 8), replay.make_memory(8, 2)
-    for _ in range(8):
-        s, following = rng.normal(size=(2, 2)).astype(np.float32)
-        replay.store(memory, s, rng.integers(3), rng.normal(), following, rng.random() < 0.3)
-    learner.slots[:] = np.arange(8)
-    way = settings(batch_size=8)
-    q_update.loss_gradient(way, learner, memory)
-    gradient, theta = learner.gradient.copy(), learner.parameters.copy()
-    for i in range(theta.size):
-        losses = []
-        for sign in (1, -1):
-            learner.parameters[:] = theta
-            learner.parameters[i] += sign * np.float32(1e-2)
-            losses.append(q_update.loss_gradient(way, learner, memory))
-        assert gradient[i] == pytest.approx((losses[0] - losses[1]) / 2e-2, abs=2e-2)
-
-
-@pytest.mark.parametrize("adam", [False, True])
-def test_updates_are_those_of_torch_with_uncached_targets(adam):
-    """Weights after 30 updates with copies in between: V is cached here, computed anew in torch."""
-    sizes, rng = (2, 10, 20, 3), np.random.default_rng(5)
-    way = settings(batch_size=64, copy_every=7, adam=adam, learning_rate=1e-2)
-    learner, memory = learner_of(sizes, 64, adam=adam), replay.make_memory(50, 2)
-    online, fixed = (networks.to_torch(sizes, learner.parameters) for _ in range(2))
-    parameters = list(online.parameters())
-    mean_squares = [torch.ones_like(p) for p in parameters]
-    moments = [(torch.zeros_like(p), torch.zeros_like(p)) for p in parameters]
-    for count in range(1, 31):
-        s, following = rng.normal(size=(2, 2)).astype(np.float32)
-        replay.store(memory, s, rng.integers(3), rng.normal(), following, rng.random() < 0.3)
-        assert q_update.update(way, learner, memory, rng.random(64))
-        s, following, a, r, end = (torch.from_numpy(x[learner.slots]) for x in memory[:5])
-        with torch.no_grad():
-            y = r + 0.9 * fixed(following).max(1).values * ~end
-        online.zero_grad()
-        ((y - online(s).gather(1, a[:, None])[:, 0]) ** 2).mean().backward()
-        with torch.no_grad():
-            for p, v, (m1, m2) in zip(parameters, mean_squares, moments, strict=True):
-                g = p.grad
-                if adam:
-                    m1.mul_(0.9).add_(0.1 * g)
-                    m2.mul_(0.999).add_(0.001 * g * g)
-                    step = 1e-2 * np.sqrt(1 - 0.999**count) / (1 - 0.9**count)
-                    p -= step * m1 / (m2.sqrt() + 1e-8)
-                else:
-                    v.mul_(0.9).add_(0.1 * g * g)
-                    p -= 1e-2 * g / (v + 1e-10).sqrt()
-        if count % 7 == 0:
-            fixed.load_state_dict(online.state_dict())
-    expected = np.concatenate([p.detach().numpy().ravel() for p in parameters])
-    np.testing.assert_allclose(learner.parameters, expected, atol=2e-3)
-
-
-def test_the_fixed_network_changes_only_at_copies():
-    rng, way = np.random.default_rng(6), settings(batch_size=8, copy_every=5)
-    learner, memory = learner_of((2, 4, 3), 8), filled(20, 20)
-    held, seen = learner.fixed.copy(), []
-    for count in range(1, 21):
-        assert q_update.update(way, learner, memory, rng.random(8))
-        assert not np.array_equal(learner.parameters, held)
-        changed = not np.array_equal(learner.fixed, held)
-        assert changed == (count % 5 == 0)
-        if changed:
-            np.testing.assert_array_equal(learner.fixed, learner.parameters)
-            seen.append(int(learner.counts[COPIES]))
-        held = learner.fixed.copy()
-    assert seen == [1, 2, 3, 4]
-
-
-def test_learning_starts_when_told_and_goes_on_at_the_rate_told():
-    way = settings(learning_starts=5, update_every=2)
-    learner, memory = learner_of((2, 3), 4), replay.make_memory(10, 2)
-    s, shape = np.zeros(2, np.float32), compiled_shape("rl_core.worlds.shaping:original")
-    answers = [
-        q_update.remember(way, learner, memory, shape, s, 0, 0.0, s, False) for _ in range(9)
-    ]
-    assert answers == [NOTHING] * 5 + [DUE, NOTHING, DUE, NOTHING]
+def test_torch_gives_the_same_bits_twice_alone_and_among_others():
+    config = dataclasses.replace(CONFIGS["MountainCar-v0"], engine="torch", learning_starts=300)
+    first = dqn("MountainCar-v0", config, episodes=1, seeds=[5, 1])
+    assert_same(first, dqn("MountainCar-v0", config, episodes=1, seeds=[5, 1]))
+    assert_same(only(first, [5, 1], 1), dqn("MountainCar-v0", config, episodes=1, seeds=[1]))
 
 
 def test_actions_are_greedy_random_and_kept_as_often_as_they_should():
-    sizes, rng = (2, 3), np.random.default_rng(7)
+    rng, s = np.random.default_rng(7), np.ones(2, np.float32)
     _, theta = networks.pack({"layer0.weight": np.array([[0, 0, 1], [0, 0, 0]], np.float32)})
-    learner = make_learner(sizes, theta, biases=True, adam=False, batch_size=1, schedule=0.3)
-    s, units = np.ones(2, np.float32), np.empty(5, np.float32)
-    draws = [q_update.act(settings(), learner, s, *rng.random(2), units) for _ in range(20_000)]
+
+    def learner_of(persistence):
+        way = Settings(0.9, 1, 1, 1, 10, persistence, 1e-3, False, False, 3)
+        return make_learner((2, 3), theta.copy(), way, schedule_state(0.3), biases=True)
+
+    learner = learner_of(1)
+    draws = [act(learner, s, *rng.random(2)) for _ in range(20_000)]
     expected = 20_000 * np.array([0.1, 0.1, 0.8])
     assert stats.chisquare(np.bincount(draws), expected).pvalue > 1e-3
-    way, kept = settings(persistence=4), []
-    for _ in range(2_000):
-        kept.append(q_update.act(way, learner, s, *rng.random(2), units))
+    learner = learner_of(4)
+    kept = [act(learner, s, *rng.random(2)) for _ in range(2_000)]
     runs = np.diff(np.flatnonzero(np.diff([9, *kept, 9])))
     left = [
         length
@@ -371,6 +260,74 @@ def test_actions_are_greedy_random_and_kept_as_often_as_they_should():
     ]
     assert len(left) > 50
     assert all(length % 4 == 0 for length in left[:-1])
+
+
+@pytest.mark.parametrize("which", [0, 1], ids=["compiled", "torch"])
+def test_learning_starts_when_told_and_goes_on_at_the_rate_told(which):
+    config = DQNConfig(
+        network=LINEAR, batch_size=4, memory_size=10, learning_starts=5, update_every=2
+    )
+    world, updates = open_world("MountainCar-v0"), []
+    for max_steps in range(1, 10):
+        learner, memory = list(both_learners(config, world))[which]
+        play_one(world, learner, memory, config, max_steps)
+        updates.append(int(learner.counts[UPDATES]))
+    assert updates == [0, 0, 0, 0, 0, 1, 1, 2, 2]
+
+
+# Modules
+
+
+def test_a_module_learns_and_comes_back_under_its_own_names():
+    module = Module("test_dqn:small_network")
+    config = dataclasses.replace(SMALL, network=module, engine=None, max_episode_steps=220)
+    assert config.engine == "torch"
+    run = dqn("MountainCar-v0", config, episodes=1, seeds=[0, 1], snapshots=(1,))
+    assert run.arrays["2.weight"].shape == (2, 3, 10)
+    assert not np.array_equal(run.arrays["0.weight"], run.arrays["initial/0.weight"])
+    assert_same(run, dqn("MountainCar-v0", config, episodes=1, seeds=[0, 1], snapshots=(1,)))
+    loaded = small_network(2, 3)
+    modules.load_arrays(loaded, {name: run.arrays[name][1] for name in loaded.state_dict()})
+    np.testing.assert_array_equal(loaded[2].weight.detach().numpy(), run.arrays["2.weight"][1])
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        ("test_dqn:one_too_many", r"^network must put out the shape \(batch, 2\)"),
+        ("test_dqn:no_network", r"^network must make a torch.nn.Module"),
+    ],
+)
+def test_another_network_is_refused_before_an_episode_is_played(function, message):
+    class Untouchable(Corridor):
+        def reset(self, **arguments):
+            raise AssertionError("an episode was played")
+
+    config = dataclasses.replace(SMALL, network=Module(function), engine=None)
+    for refuse in (check_dqn, lambda *these: dqn(*these, episodes=1, seeds=[0])):
+        with pytest.raises(ValueError, match=message):
+            refuse(Untouchable, config)
+
+
+# A user's own task
+
+
+def test_a_user_s_own_task_is_learned_compiled():
+    """A corridor of five cells, left on the right, from the first or the second cell."""
+    assert isinstance(open_world("toy_task:Corridor"), TaskWorld)
+    config = DQNConfig(
+        network=MLP((16,)),
+        optimiser="adam",
+        learning_rate=1e-2,
+        batch_size=32,
+        memory_size=1000,
+        learning_starts=64,
+        copy_every=20,
+        epsilon=Linear(1.0, 0.0, steps=600),
+    )
+    run = dqn("toy_task:Corridor", config, episodes=100, seeds=[0, 1])
+    assert run.table.groupby("seed")["steps"].tail(10).between(4, 5).all()
+    assert_same(run, dqn(CompiledCorridor, config, episodes=100, seeds=[0, 1]))
 
 
 # What a run promises
@@ -396,12 +353,11 @@ def test_training_compiled_and_through_gymnasium_gives_the_same_bits(name):
     compiled = dqn(name, CONFIGS[name], **arguments)
     assert (compiled.arrays["layer0.weight"] != compiled.arrays["initial/layer0.weight"]).any()
     assert_same(compiled, dqn(plain, CONFIGS[name], **arguments))
-    assert_same(compiled, dqn(plain(), CONFIGS[name], **arguments))
 
 
 def test_through_the_store_with_workers_and_resumed_the_bits_are_the_same(tmp_path):
     arms = [Arm(name, dqn, name, config, 3) for name, config in CONFIGS.items()]
-    arguments = {"seeds": range(4), "block": 2, "progress": False}
+    arguments = {"seeds": range(4), "progress": False}
     one = run_arms(arms, store=tmp_path / "one", workers=1, **arguments)
     run_arms(arms[:1], store=tmp_path / "two", workers=2, seeds=[1, 3], progress=False)
     two = run_arms(arms, store=tmp_path / "two", workers=2, **arguments)
@@ -426,7 +382,7 @@ def test_seeds_differ_in_weights_actions_batches_and_environment():
 
 def test_actions_and_starts_that_the_agents_meet_differ_from_seed_to_seed():
     config = dataclasses.replace(SMALL, epsilon=1.0, learning_starts=1_000, max_episode_steps=30)
-    config = dataclasses.replace(config, hidden=())
+    config = dataclasses.replace(config, network=LINEAR)
     met = []
     for seed in range(10):
         env = Recording(gymnasium.make("MountainCar-v0").unwrapped)
@@ -552,7 +508,7 @@ def test_the_values_of_a_corridor_are_learned():
     """Gamma 0.5 and a reward of 1 at the end: Q*(s, right) = 1/4, 1/2, 1."""
     config = DQNConfig(
         gamma=0.5,
-        hidden=(),
+        network=LINEAR,
         optimiser="adam",
         learning_rate=1e-2,
         batch_size=32,
@@ -564,6 +520,10 @@ def test_the_values_of_a_corridor_are_learned():
     run = dqn(Corridor, config, episodes=400, seeds=range(3))
     expected = [[0.125, 0.25], [0.125, 0.5], [0.25, 1.0]]
     np.testing.assert_allclose(run.arrays["layer0.weight"], [expected] * 3, atol=0.03)
+    module = Module("test_dqn:table_of_weights")
+    stated = dataclasses.replace(config, network=module, engine=None)
+    run = dqn(Corridor, stated, episodes=150, seeds=[0])
+    np.testing.assert_allclose(run.arrays["weight"][0].T, expected, atol=0.1)
     through = dataclasses.replace(config, bootstrap_through_end=True)
     run = dqn(Corridor, through, episodes=400, seeds=range(3))
     assert (run.arrays["layer0.weight"][:, 2, 1] > 1.5).all()  # 1 + 0.5 * 2: the end is worth more
@@ -573,7 +533,7 @@ def test_a_truncated_step_is_stored_as_one_that_goes_on():
     """Gamma 0.5 and 1 a step for ever: Q* = 2. Were truncation taken for the end, Q would be 1."""
     config = DQNConfig(
         gamma=0.5,
-        hidden=(),
+        network=LINEAR,
         optimiser="adam",
         learning_rate=1e-2,
         batch_size=16,
@@ -588,8 +548,7 @@ def test_a_truncated_step_is_stored_as_one_that_goes_on():
 
 
 CART_POLE = DQNConfig(
-    hidden=(64, 64),
-    biases=True,
+    network=MLP((64, 64)),
     optimiser="adam",
     learning_rate=1e-3,
     batch_size=128,
@@ -597,7 +556,7 @@ CART_POLE = DQNConfig(
     learning_starts=500,
     update_every=2,
     copy_every=100,
-    epsilon=Decay(1.0, 0.0, 5_000),
+    epsilon=Linear(1.0, 0.0, steps=5_000),
     shaping=Shaping("rl_core.worlds.shaping:balance"),
     max_env_steps=80_000,
 )
@@ -622,46 +581,59 @@ def test_cart_pole_is_solved_through_the_plain_loop():
 
 
 @pytest.mark.parametrize(
-    ("field", "value"),
+    ("field", "value", "error"),
     [
-        ("gamma", -0.1),
-        ("gamma", 1.1),
-        ("gamma", np.nan),
-        ("hidden", (10, 0)),
-        ("hidden", [10]),
-        ("biases", 1),
-        ("optimiser", "sgd"),
-        ("optimiser", np.array(["adam", "sgd"])),
-        ("learning_rate", 0.0),
-        ("learning_rate", np.inf),
-        ("batch_size", 0),
-        ("memory_size", 511),
-        ("memory_size", 600.0),
-        ("learning_starts", 0),
-        ("update_every", 0),
-        ("copy_every", 0),
-        ("copy_every", 2.5),
-        ("epsilon", 1.5),
-        ("epsilon", "low"),
-        ("epsilon", None),
-        ("persistence", 0),
-        ("shaping", "rl_core.worlds.shaping:tip_height"),
-        ("bootstrap_through_end", 0),
-        ("max_episode_steps", 0),
-        ("max_env_steps", -1),
+        ("gamma", -0.1, ValueError),
+        ("gamma", 1.1, ValueError),
+        ("gamma", np.nan, ValueError),
+        ("network", (10, 0), TypeError),
+        ("network", None, TypeError),
+        ("optimiser", "sgd", ValueError),
+        ("optimiser", np.array(["adam", "sgd"]), TypeError),
+        ("learning_rate", 0.0, ValueError),
+        ("learning_rate", np.inf, ValueError),
+        ("batch_size", 0, ValueError),
+        ("memory_size", 511, ValueError),
+        ("memory_size", 600.0, TypeError),
+        ("learning_starts", 0, ValueError),
+        ("update_every", 0, ValueError),
+        ("copy_every", 0, ValueError),
+        ("copy_every", 2.5, TypeError),
+        ("epsilon", 1.5, ValueError),
+        ("epsilon", "low", TypeError),
+        ("epsilon", None, TypeError),
+        ("epsilon", Linear(1, 0, episodes=9), ValueError),
+        ("persistence", 0, ValueError),
+        ("shaping", "rl_core.worlds.shaping:tip_height", TypeError),
+        ("bootstrap_through_end", 0, TypeError),
+        ("max_episode_steps", 0, ValueError),
+        ("max_env_steps", -1, ValueError),
+        ("engine", "jax", ValueError),
+        ("engine", 3, TypeError),
     ],
 )
-def test_a_setting_out_of_range_is_refused(field, value):
-    with pytest.raises(ValueError, match=rf"^{field} must be .*, got "):
+def test_a_setting_out_of_range_is_refused(field, value, error):
+    with pytest.raises(error, match=rf"^{field} must be .*, got "):
         DQNConfig(**{field: value})
 
 
-@pytest.mark.parametrize("schedule", [Decay, HalfWay])
-@pytest.mark.parametrize("changes", [{"start": 1.1}, {"end": -0.1}, {"end": np.nan}])
-def test_a_schedule_out_of_range_is_refused(schedule, changes):
-    (name,) = changes
-    with pytest.raises(ValueError, match=rf"^epsilon.{name} must be a number from 0 to 1"):
-        schedule(**changes)
+def test_the_smallest_settings_are_allowed():
+    counts = ("batch_size", "memory_size", "learning_starts", "update_every", "copy_every")
+    config = DQNConfig(**dict.fromkeys((*counts, "persistence", "max_episode_steps"), 1), gamma=0)
+    assert dqn("MountainCar-v0", config, episodes=1, seeds=[0]).table["steps"].tolist() == [1]
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.sampled_from([field.name for field in dataclasses.fields(DQNConfig)]), ODD)
+def test_settings_of_any_type_become_plain_or_are_refused_by_name(name, value):
+    def make(**settings):
+        return DQNConfig(**{"memory_size": 2**40} | settings)
+
+    config = try_out(make, name, value)
+    if config is not None:
+        assert all(type(found) in (*PLAIN, MLP, HalfWay) for found in vars(config).values()), vars(
+            config
+        )
 
 
 @pytest.mark.parametrize(
@@ -671,54 +643,78 @@ def test_a_schedule_out_of_range_is_refused(schedule, changes):
         "rl_core.nowhere:f",
         "rl_core.worlds.shaping:nothing",
         "rl_core.worlds.shaping:Shaping",
-        3,
+        "toy_task:LENGTH",
     ],
 )
 def test_an_impossible_shaping_is_refused(function):
-    with pytest.raises(ValueError, match=r"^shaping must be "):
+    with pytest.raises(ValueError, match=r"^function must be .*, got "):
         Shaping(function)
 
 
 @pytest.mark.parametrize(
-    ("argument", "value"),
+    ("argument", "value", "error"),
     [
-        ("seeds", []),
-        ("seeds", [1, 1]),
-        ("seeds", [-1]),
-        ("seeds", [True]),
-        ("seeds", 5),
-        ("seeds", None),
-        ("episodes", 0),
-        ("snapshots", (11,)),
-        ("snapshots", 5),
-        ("progress", 5),
-        ("config", None),
+        ("seeds", [], ValueError),
+        ("seeds", [1, 1], ValueError),
+        ("seeds", [-1], ValueError),
+        ("seeds", [True], TypeError),
+        ("seeds", 5, TypeError),
+        ("seeds", None, TypeError),
+        ("episodes", 0, ValueError),
+        ("snapshots", (11,), ValueError),
+        ("snapshots", 5, TypeError),
+        ("progress", 5, TypeError),
+        ("config", None, TypeError),
     ],
 )
-def test_an_argument_out_of_range_is_refused_before_anything_runs(argument, value):
+def test_an_argument_out_of_range_is_refused_before_anything_runs(argument, value, error):
     def refuse():
         raise AssertionError("an environment was made")
 
     arguments = {"config": SMALL, "episodes": 10, "seeds": [0], argument: value}
-    with pytest.raises(ValueError, match=rf"^{argument} must be .*, got "):
+    with pytest.raises(error, match=rf"^{argument} must be .*, got "):
         dqn(refuse, arguments.pop("config"), **arguments)
 
 
 def test_environments_with_other_spaces_are_refused():
-    with pytest.raises(ValueError, match="Discrete action space"):
-        dqn("MountainCarContinuous-v0", SMALL, episodes=1, seeds=[0])
-    with pytest.raises(ValueError, match="Box observation space"):
-        dqn("FrozenLake-v1", SMALL, episodes=1, seeds=[0])
     several = gymnasium.make("CartPole-v1").unwrapped
     several.action_space = spaces.MultiDiscrete([2, 2])
-    with pytest.raises(ValueError, match=r"env must have a Discrete action space, got MultiD"):
-        dqn(several, SMALL, episodes=1, seeds=[0])
-    with pytest.raises(ValueError, match="env must be an id that Gymnasium knows"):
-        dqn("Pole-v7", SMALL, episodes=1, seeds=[0])
-    with pytest.raises(ValueError, match="env must be an id that Gymnasium knows"):
-        dqn("nowhere:Foo-v0", SMALL, episodes=1, seeds=[0])
-    with pytest.raises(TypeError, match="env must be a Gymnasium id"):
-        dqn(3, SMALL, episodes=1, seeds=[0])
+    for env, error, message in (
+        (
+            "MountainCarContinuous-v0",
+            ValueError,
+            "env must have a Discrete action space, got a Box",
+        ),
+        ("FrozenLake-v1", ValueError, "env must have a Box observation space, got Discrete"),
+        (several, ValueError, "env must have a Discrete or a Box action space, got MultiD"),
+        ("Pole-v7", ValueError, "env must be an id that Gymnasium knows, got 'Pole-v7'"),
+        ("nowhere:Foo-v0", ValueError, "env must have a module that can be imported"),
+        (3, TypeError, "env must be a Gymnasium id.*, got 3"),
+    ):
+        for refuse in (check_dqn, lambda *these: dqn(*these, episodes=1, seeds=[0])):
+            with pytest.raises(error, match=f"^{message}"):
+                refuse(env, SMALL)
+
+
+def test_seeds_share_no_environment():
+    """One that counts its resets and pays them: the second seed begins with 1 again."""
+    given_ready = gymnasium.make("CartPole-v1")
+    with pytest.raises(ValueError, match=r"^env must be an id or a function .* several"):
+        dqn(given_ready, SMALL, episodes=1, seeds=[0, 1])
+
+    class Counting(Endless):
+        episodes = 0
+
+        def reset(self, **arguments):
+            self.episodes += 1
+            return super().reset(**arguments)
+
+        def step(self, action):
+            observation, _, *rest = super().step(action)
+            return observation, float(self.episodes), *rest
+
+    table = dqn(Counting, SMALL, episodes=3, seeds=[4, 7]).table
+    assert table["return"].tolist() == [1, 2, 3] * 2
 
 
 def test_a_config_is_plain_data():

@@ -229,7 +229,7 @@ def test_nothing_compiled_is_called_with_it(monkeypatch, kind):
         acted.append(observation.copy())
         action[:] = 0
 
-    monkeypatch.setattr("rl_core.episodes.act", act)
+    monkeypatch.setattr("rl_core.worlds.episodes.act", act)
     with pytest.raises(ValueError, match=r"at step 2 of an episode, came an observation"):
         reinforce(lambda: Odd(OBSERVATIONS[kind]), ReinforceConfig(), episodes=1, seeds=[0])
     assert [observation.tolist() for observation in acted] == [[0, 0], [0, 0]]

@@ -9,12 +9,13 @@ import torch
 from gymnasium import spaces
 from toy_task import Corridor
 
-from rl_core import episodes, modules, policies
-from rl_core.episodes import ModuleActor, Trajectory, play_episode
+from rl_core import modules, policies
 from rl_core.kernels import likelihood
 from rl_core.policies import Categorical, Gaussian, make_policy
 from rl_core.training import spawn_streams
+from rl_core.worlds import episodes
 from rl_core.worlds.environments import TaskWorld, open_world
+from rl_core.worlds.episodes import ModuleActor, Trajectory, play_episode
 from rl_core.worlds.twins import TASKS
 
 

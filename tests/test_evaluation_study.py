@@ -107,9 +107,38 @@ def test_every_arm_is_tried_out_and_chance_besides():
     )
 
 
-def test_every_timed_run_and_every_compared_table_has_an_arm():
+def test_every_timed_run_has_an_arm():
+    made = {arm.name for batch in (512, 32) for arm in study.timed_arms(batch)}
+    made |= {arm.name for arm in study.reported_arms() if arm.name.endswith("REINFORCE")}
+    assert made == {study.timed(name, batch) for name in study.TIMES for batch in (512, 32)}
+    assert {arm.episodes for arm in study.timed_arms(32)} == {20}
+
+
+def test_time_is_held_against_the_report_in_both_readings():
+    """As many processor seconds as the report has, or half, or twice as many; no clock is asked."""
+    factors = {512: 2.0, 32: 0.5}
+    times = pd.DataFrame(
+        {
+            "arm": study.timed(name, batch),
+            "episodes": 20,
+            "processor": "p",
+            "seconds": 1e9,
+            "processor_seconds": [seconds * (factor if name.endswith("DQN") else 0.25)] * 3,
+        }
+        for batch, factor in factors.items()
+        for name, seconds in study.TIMES.items()
+    ).explode("processor_seconds")
+    times["processor_seconds"] = times["processor_seconds"].astype(float)
+    found = study.judged_times(times)
+    assert found.answers == ("yes", "yes", "yes", "no", "no")
+    assert found.others[0].answers == ("yes",) * 5
+    assert found.verdict == "depends on the reading"
+    table = study.compared_times(times.drop_duplicates())
+    assert table["then / now"].tolist() == [4, 4, 4, 0.5, 2, 0.5, 2]
+
+
+def test_every_compared_table_has_an_arm():
     names = {arm.name for arm in study.arms()}
-    assert set(study.TIMES) <= names
     for name in study.ENV:
         assert f"{name}, table, {study.chosen_bins(name)} bins" in names
 

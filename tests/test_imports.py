@@ -6,7 +6,7 @@ import textwrap
 
 import pytest
 
-from rl_core.imports import code_behind, imported
+from rl_core.identity import code_behind, imported
 
 
 def test_what_stands_there_is_found():

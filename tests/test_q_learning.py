@@ -8,23 +8,37 @@ import numpy as np
 import pandas as pd
 import pytest
 from gymnasium import spaces
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from odd_values import ODD, PLAIN, try_out
+from test_appraisal import loss
+from toy_task import Corridor
 
+from rl_core.evaluation import evaluate_table
 from rl_core.exploration import (
     EpsilonGreedy,
-    Evaluation,
     Geometric,
+    HalfWay,
     Linear,
     Softmax,
+    Trials,
     UnnormalisedSoftmax,
     VisitDecay,
 )
 from rl_core.identity import describe
+from rl_core.kernels.appraisal import COLUMNS
 from rl_core.maze import Maze
 from rl_core.mdp import MDP
 from rl_core.planning import optimal_actions, value_iteration
-from rl_core.q_learning import QLearningConfig, q_learning, q_learning_on_model
-from rl_core.tabular import spawn_streams
-from rl_core.tabular_record import COLUMNS, make_yardstick, new_appraisal, value_lost
+from rl_core.q_learning import (
+    QLearningConfig,
+    check_q_learning,
+    check_q_learning_on_model,
+    q_learning,
+    q_learning_on_model,
+)
+from rl_core.worlds.discretise import gridded
+from rl_core.worlds.tabular import spawn_draws
 
 MEASURED = ("error_norm", "rmse", "rmse_visitable", "optimal_states", "value_lost")
 
@@ -118,7 +132,7 @@ def test_it_finds_the_optimal_values_of_the_maze(maze, Q_star):
 def test_it_is_the_textbook_program(Q_star):
     """The same run, written anew for Gymnasium without any of the package's loops."""
     episodes, alpha, gamma, epsilon = 60, 0.3, 0.9, 0.6
-    start, step, policy = spawn_streams(7, 2)[0]
+    start, step, policy = spawn_draws(7, 2)[0]
     env = Maze()
     Q, visits, rows = np.zeros((112, 4)), np.zeros((112, 4), dtype=int), []
     for _ in range(episodes):
@@ -141,7 +155,7 @@ def test_it_is_the_textbook_program(Q_star):
     np.testing.assert_array_equal(run.arrays["visits"][0], visits)
     ours = run.table[["steps", "return", "visited_entries", "error_norm"]].to_numpy(dtype=float)
     assert ours == pytest.approx(np.array(rows, dtype=float))
-    assert start.random() == spawn_streams(7, 2)[0].start.random()  # the Maze's reset drew nothing
+    assert start.random() == spawn_draws(7, 2)[0].start.random()  # the Maze's reset drew nothing
 
 
 # The two paths
@@ -160,14 +174,14 @@ def test_it_is_the_textbook_program(Q_star):
     ("exploration", "step_size"),
     [
         (EpsilonGreedy(0.5), 0.2),
-        (Softmax(Geometric(2.0, 0.1, episodes=10)), VisitDecay(Linear(0.9, 0.5, 5), 0.7)),
+        (Softmax(Geometric(2.0, 0.1, episodes=10)), VisitDecay(Linear(0.9, 0.5, episodes=5), 0.7)),
     ],
 )
 def test_the_compiled_path_and_the_plain_loop_agree_bit_for_bit(
     env, episodes, exploration, step_size
 ):
     config = QLearningConfig(
-        step_size=step_size, exploration=exploration, evaluation=Evaluation(every=6, episodes=3)
+        step_size=step_size, exploration=exploration, evaluation=Trials(every=6, episodes=3)
     )
     snapshots = (0, 3, episodes)
     compiled = q_learning_on_model(
@@ -208,12 +222,12 @@ def test_a_cap_is_a_time_limit():
     config = QLearningConfig(
         exploration=EpsilonGreedy(0.5),
         max_steps=6,
-        evaluation=Evaluation(every=10, max_steps=6),
+        evaluation=Trials(every=10, max_steps=6),
     )
     capped = q_learning(MDP.from_env("FrozenLake-v1"), config, episodes=300, seeds=[0])
     limited = q_learning(
         lambda: gym.make("FrozenLake-v1", max_episode_steps=6),
-        QLearningConfig(exploration=EpsilonGreedy(0.5), evaluation=Evaluation(every=10)),
+        QLearningConfig(exploration=EpsilonGreedy(0.5), evaluation=Trials(every=10)),
         episodes=300,
         seeds=[0],
     )
@@ -282,6 +296,63 @@ def test_without_optimal_values_the_errors_are_missing(maze):
     assert run.table["eval_return"].notna().sum() == 1
 
 
+# Continuous worlds through a grid
+
+GRID = QLearningConfig(
+    gamma=0.99, step_size=0.3, exploration=EpsilonGreedy(0.02), max_steps=5_000, bins=10
+)
+
+
+def test_it_learns_mountain_car():
+    run = q_learning("MountainCar-v0", GRID, episodes=1_000, seeds=[100, 101, 102])
+    for position, seed in enumerate((100, 101, 102)):
+        steps = run.table.loc[run.table["seed"] == seed, "steps"]
+        assert steps.tail(100).median() < min(350, steps.head(20).median() / 2)
+        Q = run.arrays["Q"][position]
+        world = gridded("MountainCar-v0", 10)
+        played = evaluate_table(world, Q, seed=seed, episodes=20, max_steps=5_000)
+        assert played["steps"].median() < 350
+
+
+def test_a_grid_gives_a_seed_the_same_bits_alone_and_among_others():
+    config = dataclasses.replace(GRID, bins=8, levels=3)
+    name = "MountainCarContinuous-v0"
+    together = q_learning(name, config, episodes=3, seeds=[1, 2])
+    alone = q_learning(name, config, episodes=3, seeds=[2])
+    np.testing.assert_array_equal(together.arrays["Q"][1], alone.arrays["Q"][0])
+
+
+def test_any_environment_is_seen_through_a_grid():
+    config = dataclasses.replace(GRID, bins=(5, 3, 4), levels=3)
+    run = q_learning(lambda: gym.make("Pendulum-v1"), config, episodes=2, seeds=[0])
+    assert run.arrays["Q"].shape == (1, 60, 3)
+    assert run.table["steps"].tolist() == [200, 200]
+    same_bits(run, q_learning("Pendulum-v1", config, episodes=2, seeds=[0]))
+
+
+def test_a_budget_stops_within_an_episode_on_a_grid_too():
+    whole = q_learning("MountainCar-v0", GRID, episodes=9, seeds=[0])
+    limited = dataclasses.replace(GRID, max_env_steps=2_000)
+    cut = q_learning("MountainCar-v0", limited, episodes=9, seeds=[0])
+    n = len(cut.table) - 1
+    assert n >= 1
+    assert cut.table["env_steps"].iloc[-1] == 2_000
+    assert not cut.table["terminated"].iloc[-1]
+    pd.testing.assert_frame_equal(cut.table[:n], whole.table[:n], check_exact=True)
+
+
+def test_a_task_s_time_limit_cuts_learning_and_trials():
+    """A corridor of five cells with a limit of 100: one who only goes back never arrives."""
+    rule = EpsilonGreedy(0.0)  # all values are 0 or below: the first steps try out, ties at random
+    config = QLearningConfig(
+        exploration=rule, bins=5, evaluation=Trials(every=1, episodes=2, max_steps=1000, epsilon=1)
+    )
+    run = q_learning(Corridor, config, episodes=50, seeds=[0])
+    assert (run.table["steps"] <= 100).all()
+    assert run.table["eval_steps"].max() <= 100
+    same_bits(run, q_learning("toy_task:Corridor", config, episodes=50, seeds=[0]))
+
+
 # What is recorded
 
 
@@ -317,26 +388,6 @@ def test_the_value_lost_is_known_after_every_episode(maze, Q_star):
     assert len(set(np.round(expected, 6))) > 10
 
 
-def test_an_appraisal_goes_on_from_the_policy_before(maze, Q_star):
-    yardstick = make_yardstick(maze, Q_star, Q_star.shape)
-    appraisal, rng = new_appraisal(yardstick), np.random.default_rng(0)
-    for noise in (0.0, 0.02, 0.02, 0.3, 5.0, 0.0):
-        Q = Q_star + noise * rng.normal(size=Q_star.shape)
-        lost = value_lost(Q, yardstick, 0.9, appraisal)
-        assert lost == pytest.approx(loss(maze, Q, Q_star), abs=1e-9)
-        assert value_lost(2 * Q, yardstick, 0.9, appraisal) == lost  # the same policy
-
-
-def loss(mdp, Q, Q_star, gamma=0.9):
-    """The value lost by the greedy policy, from the linear equations of its value."""
-    greedy = np.isclose(Q, Q.max(axis=1, keepdims=True), rtol=0, atol=0)
-    weight = (greedy / greedy.sum(axis=1, keepdims=True))[:, :, None] * mdp.probability
-    P = np.zeros((mdp.n_states, mdp.n_states))
-    np.add.at(P, (np.arange(mdp.n_states)[:, None, None], mdp.successor), weight)
-    V = np.linalg.solve(np.eye(mdp.n_states) - gamma * P, (weight * mdp.reward).sum(axis=(1, 2)))
-    return mdp.start_probability @ (Q_star.max(axis=1) - V)[mdp.start_state]
-
-
 def test_the_value_lost_is_averaged_over_start_states():
     model = MDP.from_env("Taxi-v4")
     Q_star = value_iteration(model, gamma=0.9, tolerance=1e-10, progress=False).Q
@@ -369,7 +420,7 @@ def test_the_evaluation_plays_short_episodes_and_leaves_learning_alone(maze):
             episodes=60,
             seeds=[0],
         )
-        for evaluation in (Evaluation(), Evaluation(every=7, episodes=4, max_steps=9, epsilon=1))
+        for evaluation in (Trials(), Trials(every=7, episodes=4, max_steps=9, epsilon=1))
     ]
     np.testing.assert_array_equal(runs[0].arrays["Q"], runs[1].arrays["Q"])
     evaluated = runs[1].table.dropna(subset="eval_steps")
@@ -436,6 +487,115 @@ def test_progress_counts_over_all_seeds(maze):
     assert calls == [(10, per_seed[0]), (20, sum(per_seed))]
 
 
+# A budget of environment steps
+
+
+@pytest.mark.parametrize("budget", [1, 99, 100, 101, 1000])
+@pytest.mark.parametrize("plain", [False, True], ids=["compiled", "plain"])
+def test_a_budget_ends_a_seed_and_changes_nothing_before(maze, budget, plain):
+    """One more than an episode's end starts another; none fails, and snapshots are the last."""
+    env = Maze if plain else maze
+    config = QLearningConfig(exploration=EpsilonGreedy(0.9), evaluation=Trials(every=2, episodes=1))
+    episodes = 12 if plain else 60
+    whole = q_learning(env, config, episodes=episodes, seeds=[3, 5])
+    limited = dataclasses.replace(config, max_env_steps=budget)
+    cut = q_learning(env, limited, episodes=episodes, seeds=[3, 5], snapshots=(0, 1, episodes))
+    assert cut.failures == ()
+    for i, seed in enumerate((3, 5)):
+        full = whole.table[whole.table["seed"] == seed].reset_index(drop=True)
+        rows = cut.table[cut.table["seed"] == seed].reset_index(drop=True)
+        before = (full["env_steps"] < budget).sum()
+        assert len(rows) == min(before + 1, episodes)
+        same = min(before, len(rows))
+        pd.testing.assert_frame_equal(rows[:same], full[:same], check_exact=True)
+        assert rows["env_steps"].iloc[-1] == min(budget, full["env_steps"].iloc[-1])
+        assert rows["steps"].sum() == rows["env_steps"].iloc[-1] == cut.arrays["visits"][i].sum()
+        if rows["env_steps"].iloc[-1] < full["env_steps"].iloc[before if before < episodes else -1]:
+            assert not rows["terminated"].iloc[-1]
+        np.testing.assert_array_equal(cut.arrays["Q_snapshots"][i, 2], cut.arrays["Q"][i])
+        assert not cut.arrays["Q_snapshots"][i, 0].any()
+
+
+def test_a_budget_that_ends_with_an_episode_ends_there(maze):
+    whole = q_learning(maze, QLearningConfig(), episodes=9, seeds=[0])
+    at = int(whole.table["env_steps"].iloc[4])
+    cut = q_learning(maze, QLearningConfig(max_env_steps=at), episodes=9, seeds=[0])
+    pd.testing.assert_frame_equal(cut.table, whole.table[:5], check_exact=True)
+    assert cut.table["terminated"].all()
+
+
+# One environment a seed
+
+
+class Remembering(gym.Wrapper):
+    """Pays how many episodes it has begun."""
+
+    def __init__(self, env):
+        super().__init__(env)
+        self.begun = self.closed = 0
+
+    def reset(self, **arguments):
+        """Count."""
+        assert not self.closed
+        self.begun += 1
+        return super().reset(**arguments)
+
+    def step(self, action):
+        """Pay, and end."""
+        observation, _, _, _, info = super().step(action)
+        return observation, float(self.begun), True, False, info
+
+    def close(self):
+        """Remember it."""
+        self.closed += 1
+        super().close()
+
+
+def make_remembering():
+    return Remembering(gym.make("FrozenLake-v1"))
+
+
+@pytest.fixture
+def registered():
+    entry = "rl_core.maze:Maze"
+    wrapper = gym.envs.registration.WrapperSpec("Remembering", "test_q_learning:Remembering", {})
+    gym.register("Remembering-v0", entry_point=entry, additional_wrappers=(wrapper,))
+    yield "Remembering-v0"
+    del gym.registry["Remembering-v0"]
+
+
+def test_what_a_wrapper_remembers_does_not_get_to_the_next_seed(registered):
+    for env in (make_remembering, "test_q_learning:make_remembering", registered):
+        run = q_learning(env, QLearningConfig(), episodes=3, seeds=[4, 7])
+        # `reset(seed=...)` comes first, and begins an episode that is not played.
+        assert run.table["return"].tolist() == [2.0, 3.0, 4.0] * 2
+
+
+def test_an_environment_given_ready_made_is_for_one_seed_and_stays_open():
+    for env, config in (
+        (make_remembering(), QLearningConfig()),
+        (Remembering(gym.make("MountainCar-v0")), QLearningConfig(bins=3)),
+    ):
+        with pytest.raises(ValueError, match=r"^env must be an id or a function .* several"):
+            q_learning(env, config, episodes=1, seeds=[0, 1])
+        check_q_learning(env, config)
+        assert len(q_learning(env, config, episodes=2, seeds=iter([5])).table) == 2
+        assert env.closed == 0
+
+
+@pytest.mark.parametrize("bins", [None, 3])
+def test_what_was_opened_is_closed(bins):
+    made = []
+
+    def make():
+        made.append(Remembering(gym.make("MountainCar-v0" if bins else "FrozenLake-v1")))
+        return made[-1]
+
+    q_learning(make, QLearningConfig(bins=bins), episodes=1, seeds=[0, 1])
+    assert len(made) > 1
+    assert [env.closed for env in made] == [1] * len(made)
+
+
 # Failures and wrong arguments
 
 
@@ -457,23 +617,46 @@ def test_a_return_that_is_not_finite_stops_that_seed_only():
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
-        ({"step_size": 0.0}, ValueError, r"step_size is 0.0; allowed are numbers in \(0, 1\]"),
-        ({"step_size": 1.01}, ValueError, "step_size is 1.01"),
-        ({"step_size": np.nan}, ValueError, "step_size is nan"),
-        ({"step_size": Linear(0.5, 0.0, 9)}, ValueError, "step_size.end is 0.0"),
-        ({"step_size": "fast"}, TypeError, "step_size is 'fast'"),
-        ({"gamma": 1.5}, ValueError, r"gamma is 1.5; allowed are numbers in \[0, 1\]"),
-        ({"gamma": -0.1}, ValueError, "gamma is -0.1"),
-        ({"gamma": Linear(0.5, 0.9, 9)}, TypeError, "gamma is Linear"),
-        ({"exploration": 0.1}, TypeError, "exploration is 0.1; allowed are instances of"),
-        ({"evaluation": None}, TypeError, "evaluation is None"),
-        ({"max_steps": 0}, ValueError, "max_steps is 0; allowed are integers from 1"),
-        ({"max_steps": 10.0}, TypeError, "max_steps is 10.0"),
+        ({"step_size": 0.0}, ValueError, "step_size must be a number above 0 up to 1, got 0.0"),
+        ({"step_size": 1.01}, ValueError, "step_size must .*, got 1.01"),
+        ({"step_size": np.nan}, ValueError, "step_size must .*, got nan"),
+        ({"step_size": Linear(0.5, 0.0, episodes=9)}, ValueError, "step_size.end must .*, got 0.0"),
+        ({"step_size": Linear(0.5, 0.1, steps=9)}, ValueError, "step_size must .* by the episode"),
+        ({"step_size": HalfWay()}, TypeError, "step_size must .*, got HalfWay"),
+        ({"step_size": "fast"}, TypeError, "step_size must .*, got 'fast'"),
+        ({"gamma": 1.5}, ValueError, "gamma must be a number from 0 to 1, got 1.5"),
+        ({"gamma": -0.1}, ValueError, "gamma must .*, got -0.1"),
+        ({"gamma": Linear(0.5, 0.9, episodes=9)}, TypeError, "gamma must .*, got Linear"),
+        ({"exploration": 0.1}, TypeError, "exploration must be EpsilonGreedy.*, got 0.1"),
+        ({"evaluation": None}, TypeError, r"evaluation must be Trials\(...\), got None"),
+        ({"max_steps": 0}, ValueError, "max_steps must be an integer from 1 or None, got 0"),
+        ({"max_steps": 10.0}, TypeError, "max_steps must .*, got 10.0"),
+        ({"max_env_steps": 0}, ValueError, "max_env_steps must be an integer from 1 or None"),
+        ({"bins": 0}, ValueError, "bins must be an integer from 1"),
+        ({"bins": (3, -1)}, ValueError, "bins must be an integer from 1"),
+        ({"bins": ()}, ValueError, "bins must be a positive integer, or one a dimension"),
+        ({"bins": 1.5}, TypeError, "bins must be an integer from 1"),
+        ({"bins": 3, "levels": 1}, ValueError, "levels must be an integer from 2 or None, got 1"),
+        ({"levels": 3}, ValueError, "levels must be None where bins is None, got 3"),
     ],
 )
 def test_wrong_settings_are_refused(arguments, error, message):
-    with pytest.raises(error, match=message):
+    with pytest.raises(error, match=f"^{message}"):
         QLearningConfig(**arguments)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.sampled_from([field.name for field in dataclasses.fields(QLearningConfig)]), ODD)
+def test_settings_of_any_type_become_plain_or_are_refused_by_name(name, value):
+    def make(**settings):
+        return QLearningConfig(**{"bins": 3} | settings)
+
+    config = try_out(make, name, value)
+    if config is not None:
+        plain = (*PLAIN, EpsilonGreedy, Trials, tuple)
+        assert all(type(found) in plain for found in vars(config).values()), vars(config)
+        bins = config.bins if isinstance(config.bins, tuple) else (3,)
+        assert {type(number) for number in bins} == {int}
 
 
 class Untouchable(Maze):
@@ -486,33 +669,61 @@ class Untouchable(Maze):
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
-        ({"Q_star": np.zeros((112, 3))}, ValueError, r"Q_star .*\(112, 3\); .* \(112, 4\)"),
-        ({"Q_star": np.full((112, 4), np.nan)}, ValueError, "Q_star has entries .* not finite"),
-        ({"Q_star": [["a"] * 4] * 112}, TypeError, "Q_star has dtype"),
-        ({"Q_star": [[1.0], [1.0, 2.0]]}, ValueError, r"Q_star is \[\[1.0\].* \(112, 4\)"),
-        ({"episodes": 0}, ValueError, "episodes is 0; allowed are integers from 1"),
-        ({"episodes": 2.5}, TypeError, "episodes is 2.5"),
-        ({"seeds": []}, ValueError, r"seeds is \[\]"),
-        ({"seeds": [0, 0]}, ValueError, r"seeds is \[0, 0\]; allowed .* once"),
-        ({"seeds": [-1]}, ValueError, "seeds is -1; allowed are integers from 0"),
-        ({"seeds": 3}, TypeError, "seeds is 3; allowed is a sequence of integers from 0"),
-        ({"snapshots": 5}, TypeError, "snapshots is 5; allowed is a sequence of integers from 0"),
-        ({"snapshots": (11,)}, ValueError, "snapshots has 11; allowed are 0 to 10"),
-        ({"config": {"gamma": 0.9}}, TypeError, "config is {'gamma': 0.9}"),
-        ({"env": "MountainCar-v0"}, ValueError, "env has the observation space Box.*Discrete"),
-        ({"env": "Blackjack-v1"}, ValueError, r"env has the observation space Tuple"),
-        ({"env": 3}, TypeError, "env is 3; allowed is an MDP"),
-        ({"env": "Labyrinth-v0"}, ValueError, "env is 'Labyrinth-v0'; allowed are ids that Gymn"),
-        ({"env": lambda: 3}, TypeError, "allowed is an MDP"),
+        (
+            {"Q_star": np.zeros((112, 3))},
+            ValueError,
+            r"Q_star must be .*\(112, 4\), got \(112, 3\)",
+        ),
+        ({"Q_star": np.full((112, 4), np.nan)}, ValueError, "Q_star must be finite, at"),
+        ({"Q_star": [["a"] * 4] * 112}, TypeError, "Q_star must be an array of numbers"),
+        ({"Q_star": [[1.0], [1.0, 2.0]]}, ValueError, r"Q_star must .*\(112, 4\), got \[\[1.0\]"),
+        ({"episodes": 0}, ValueError, "episodes must be an integer from 1, got 0"),
+        ({"episodes": 2.5}, TypeError, "episodes must .*, got 2.5"),
+        ({"seeds": []}, ValueError, r"seeds must be one or more, each once, got \(\)"),
+        ({"seeds": [0, 0]}, ValueError, r"seeds must be one or more, each once|env must be"),
+        ({"seeds": [-1]}, ValueError, "seeds must be an integer from 0, got -1"),
+        ({"seeds": 3}, TypeError, "seeds must be a sequence of integers from 0, got 3"),
+        ({"seeds": None}, TypeError, "seeds must be a sequence of integers from 0, got None"),
+        ({"snapshots": 5}, TypeError, "snapshots must be a sequence of integers from 0, got 5"),
+        ({"snapshots": (11,)}, ValueError, "snapshots must be an integer from 0 to 10, got 11"),
+        ({"progress": "x"}, TypeError, "progress must be a function .*, got 'x'"),
+        ({"config": {"gamma": 0.9}}, TypeError, "config must be a QLearningConfig, got {'gamma'"),
+        ({"env": "MountainCar-v0"}, ValueError, "env must have a Discrete observation space"),
+        ({"env": "Blackjack-v1"}, ValueError, "env must have a Discrete observation space"),
+        ({"env": 3}, TypeError, "env must be a Gymnasium id.*, got 3"),
+        ({"env": "Labyrinth-v0"}, ValueError, "env must be an id that Gymnasium knows"),
+        ({"env": lambda: 3}, TypeError, "env must be a Gymnasium id.*, got <function"),
     ],
 )
 def test_wrong_arguments_are_refused_before_anything_runs(arguments, error, message):
     usual = {"env": Untouchable(), "config": QLearningConfig(), "episodes": 10, "seeds": [0]}
-    with pytest.raises(error, match=message):
+    with pytest.raises(error, match=f"^({message})"):
         q_learning(**{**usual, **arguments})
     usual["env"] = Maze().model()
-    with pytest.raises(error, match=message):
+    with pytest.raises(error, match=f"^({message})"):
         q_learning(**{**usual, **arguments})
+
+
+@pytest.mark.parametrize(
+    ("env", "config", "message"),
+    [
+        (Maze().model(), QLearningConfig(bins=4), "bins must be None where states are numbered"),
+        ("FrozenLake-v1", QLearningConfig(bins=4), "env's observation space must be a Box"),
+        (
+            "MountainCar-v0",
+            QLearningConfig(bins=(4, 4, 4)),
+            "bins must be a positive integer, or 2",
+        ),
+        ("MountainCar-v0", QLearningConfig(bins=4, levels=3), "levels must be None"),
+        ("Pendulum-v1", QLearningConfig(bins=4), "levels must be an integer from 2"),
+        ("CartPole-v1", QLearningConfig(bins=4), "low must be finite"),
+    ],
+)
+def test_bins_and_levels_have_to_go_with_the_world(env, config, message):
+    with pytest.raises(ValueError, match=f"^{message}"):
+        check_q_learning(env, config)
+    with pytest.raises(ValueError, match=f"^{message}"):
+        q_learning(env, config, episodes=1, seeds=[0])
 
 
 def test_seeds_and_snapshots_may_be_arrays(maze):
@@ -552,11 +763,21 @@ def test_an_environment_may_use_the_names_of_a_model_for_something_else(attribut
 def test_only_an_environment_with_a_model_is_played_by_its_model():
     with pytest.raises(ValueError, match="must have a transition table"):
         q_learning_on_model("MountainCar-v0", QLearningConfig(), episodes=1, seeds=[0])
-    with pytest.raises(TypeError, match="allowed is an environment's id"):
+    with pytest.raises(TypeError, match=r"^env must be an environment's id, got "):
         q_learning_on_model(Maze(), QLearningConfig(), episodes=1, seeds=[0])
+    for config, message in (
+        (QLearningConfig(gamma=1), r"^gamma must be below 1, for planning, got 1.0"),
+        (QLearningConfig(bins=5), r"^bins must be None where states are numbered, got 5"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            check_q_learning_on_model("rl_core/Maze-v0", config)
+        with pytest.raises(ValueError, match=message):
+            q_learning_on_model("rl_core/Maze-v0", config, episodes=1, seeds=[0])
 
 
 def test_the_configuration_can_be_written_as_json():
-    config = QLearningConfig(step_size=VisitDecay(), exploration=EpsilonGreedy(Linear(1, 0.1, 9)))
+    config = QLearningConfig(
+        step_size=VisitDecay(), exploration=EpsilonGreedy(Linear(1, 0.1, episodes=9))
+    )
     assert json.loads(json.dumps(dataclasses.asdict(config)))["step_size"]["exponent"] == 0.6
     assert describe(config)["exploration"]["epsilon"]["class"] == "Linear"

@@ -62,7 +62,7 @@ def test_the_tip_is_as_high_as_its_links_reach(theta1, theta2):
 
 @pytest.mark.parametrize("name", ["original", "tip_height", "distance_from_start", "balance"])
 def test_compiled_shapes_are_the_functions(name):
-    """To the precision of the observation: compiled code multiplies as many digits as it was given."""
+    """To the precision of the observation, in which compiled code multiplies."""
     plain, compiled = globals()[name], compiled_shape(f"{HERE}:{name}")
     for o in np.random.default_rng(0).normal(size=(50, 6)).astype(np.float32):
         assert shaped_reward(compiled, o, -1.0) == pytest.approx(plain(o, -1.0), abs=1e-6)

@@ -33,6 +33,7 @@ from studies.continuous import (
     LEARNED,
     SIGMAS,
     SWEEPS,
+    WINDOW,
     Curves,
 )
 from studies.continuous_fates import FATES
@@ -254,3 +255,50 @@ def mean_action_maps(
     )
     plt.close(figure)
     return figure, pd.concat(tables, ignore_index=True)
+
+
+def profiles(table: pd.DataFrame) -> Figure:
+    """Share of seeds that need at most so many steps at the end, a line an arm."""
+    figure, axes = plt.subplots(figsize=(6.4, 4.4))
+    for (arm, rows), colour, line in zip(
+        table.groupby("arm", sort=False), COLOURS, LINES, strict=False
+    ):
+        axes.step(rows["steps"], rows["share"], where="post", color=colour, ls=line, label=arm)
+    axes.axvline(LEARNED, color=GREY, lw=0.8, ls=":")
+    axes.text(LEARNED, 0.02, " counts as learned", fontsize=8, color=GREY)
+    axes.set_ylim(0, 1)
+    label(axes, x="steps at episode 5,000, at most", y="share of seeds")
+    figure.legend(loc="outside lower center", ncols=2, fontsize=9)
+    plt.close(figure)
+    return figure
+
+
+def over_reported(curves: Curves, table: pd.DataFrame, text: str) -> Figure:
+    """The seeds of a changed arm over those of the reported one, as far as the first go."""
+    figure, axes = plt.subplots(figsize=(6.4, 4.0))
+    last = int(table["episode"].max())
+    for steps in curves.smooth["as reported"]:
+        axes.plot(np.arange(1, last + 1), steps[:last], color=GREY, lw=0.5)
+    for _, rows in table.groupby("seed"):
+        steps = rows["steps"].rolling(WINDOW, min_periods=1).median()
+        axes.plot(rows["episode"], steps, color=VERMILLION, lw=1.2)
+    axes.plot([], [], color=GREY, lw=0.8, label="as reported, all seeds")
+    axes.plot([], [], color=VERMILLION, label=text)
+    axes.set_yscale("log")
+    label(axes, x="episode", y="steps to the goal (log scale)")
+    axes.legend(loc="upper right")
+    plt.close(figure)
+    return figure
+
+
+def engines(tables: Mapping[str, pd.DataFrame]) -> Figure:
+    """One seed's steps an episode, as each engine has learned it."""
+    figure, axes = plt.subplots(figsize=(6.4, 3.8))
+    looks = zip(tables.items(), ((BLUE, 2.6, "-"), (ORANGE, 1.0, "--")), strict=True)
+    for (text, rows), (colour, width, line) in looks:
+        axes.plot(rows["episode"], rows["steps"], color=colour, lw=width, ls=line, label=text)
+    axes.set_yscale("log")
+    label(axes, x="episode", y="steps to the goal (log scale)")
+    axes.legend(loc="upper right")
+    plt.close(figure)
+    return figure

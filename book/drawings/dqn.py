@@ -1,27 +1,18 @@
 """Chapter 4: learning curves over those of 2018, causes side by side, and a value function."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from drawings.look import (
-    BLACK,
-    BLUE,
-    COLOURS,
-    GREY,
-    LINES,
-    ORANGE,
-    SKY_BLUE,
-    VERMILLION,
-    label,
-    median_band,
-)
+from drawings.look import BLACK, BLUE, COLOURS, GREY, LINES, ORANGE, SKY_BLUE, VERMILLION, label
 from rl_core.evaluation import Rollout, Weights, action_values
+from rl_core.statistics import bootstrap_interval
 from studies.dqn import BUDGET, ENV, EPISODES, LEARNED, PARTS, Curves
 
 PUSHES = ("left", "none", "right")
@@ -50,7 +41,7 @@ def learning_curve(curves: Curves, name: str, original: pd.DataFrame) -> Figure:
         text = f"stopped before the goal ({len(stopped)} episodes)"
         axes.plot(stopped["episode"], stopped["steps"], "x", color=BLACK, ms=5, label=text)
     text = f"median of all {len(seeds)} seeds, 95% interval"
-    median_band(axes, x, seeds, colour=BLUE, line="-", text=text)
+    _median(axes, x, seeds, BLUE, "-", text, top=np.nanmax(seeds))
     axes.set_yscale("log")
     label(axes, x="episode", y="steps to the goal (log scale)")
     figure.legend(loc="outside lower center", ncols=2, fontsize=9)
@@ -93,14 +84,100 @@ def over_the_budget(curves: Curves, names: dict[str, str]) -> Figure:
         for i, (variant, text) in enumerate(names.items()):
             steps = curves.parts(f"{name}, {variant}")
             shown = text if name == "Acrobot" else None
-            ink = {"colour": COLOURS[i], "line": LINES[i], "marker": "o"}
-            median_band(axes, middles, steps, text=shown, top=tenth, **ink)
+            _median(axes, middles, steps, COLOURS[i], LINES[i], shown, top=tenth, marker="o")
         axes.set_yscale("log")
         axes.set_xlim(0, BUDGET[name] / 1000)
         label(axes, x="environment steps (thousands)", y="steps a goal (log scale)", title=name)
     figure.legend(loc="outside lower center", ncols=2, fontsize=9)
     plt.close(figure)
     return figure
+
+
+def profiles(
+    of_arm: Mapping[str, Mapping[str, np.ndarray]], marks: Mapping[str, float] | None = None
+) -> Figure:
+    """Share of seeds that need at most so many steps a goal, on each environment.
+
+    Parameters
+    ----------
+    of_arm : mapping of str to mapping of str to ndarray of shape (seeds,)
+        Steps a goal of each seed by environment and arm.
+    marks : mapping of str to float, optional
+        By environment, what a goal costs at random: a vertical line.
+    """
+    figure, both = plt.subplots(1, len(of_arm), figsize=(7.2, 3.9), sharey=True)
+    for axes, (name, arms) in zip(np.atleast_1d(both), of_arm.items(), strict=True):
+        for i, (text, steps) in enumerate(arms.items()):
+            x = np.sort(steps[np.isfinite(steps)])
+            y = np.arange(1, len(x) + 1) / len(steps)
+            x, y = np.r_[80, x, BUDGET[name]], np.r_[0, y, y[-1:]] if len(y) else np.zeros(2)
+            axes.step(x, y, where="post", color=COLOURS[i], ls=LINES[i], lw=1.6, label=text)
+        axes.axvline(LEARNED, color=GREY, ls="-", lw=0.8)
+        if marks:
+            axes.axvline(marks[name], color=BLACK, ls=":", lw=1.2, label="random, kept for 10")
+        axes.set_xscale("log")
+        axes.set_xlim(80, 5_000)
+        axes.set_ylim(-0.02, 1.02)
+        label(axes, x="steps a goal (log scale)", y="", title=name)
+    np.atleast_1d(both)[0].set_ylabel("share of seeds at most there")
+    handles, texts = np.atleast_1d(both)[0].get_legend_handles_labels()
+    figure.legend(handles, texts, loc="outside lower center", ncols=2, fontsize=9)
+    plt.close(figure)
+    return figure
+
+
+def over_the_reported(curves: Curves, arm: str, others: Mapping[str, np.ndarray]) -> Figure:
+    """Steps an episode of some runs over all seeds of a reported arm.
+
+    Parameters
+    ----------
+    arm : str
+        The reported arm: its seeds are drawn thin, their median strong.
+    others : mapping of str to ndarray of shape (runs, episodes)
+    """
+    figure, axes = plt.subplots(figsize=(6.4, 4.2))
+    seeds = curves.raw[arm]
+    x = np.arange(1, seeds.shape[1] + 1)
+    axes.plot(x, seeds.T, color=GREY, ls="-", lw=0.4, alpha=0.5)
+    axes.plot([], [], color=GREY, ls="-", lw=0.8, label=f"each of {len(seeds)} seeds, as reported")
+    axes.plot(x, np.median(seeds, axis=0), color=BLUE, ls="-", label="their median")
+    for i, (text, runs) in enumerate(others.items(), 1):
+        for k, steps in enumerate(runs):
+            shown = text if k == 0 else None
+            at = np.arange(1, len(steps) + 1)
+            axes.plot(at, steps, color=COLOURS[i], ls=LINES[i], lw=1.3, label=shown)
+    axes.set_yscale("log")
+    label(axes, x="episode", y="steps to the goal (log scale)")
+    figure.legend(loc="outside lower center", ncols=2, fontsize=9)
+    plt.close(figure)
+    return figure
+
+
+def _median(
+    axes: Axes,
+    x: np.ndarray,
+    seeds: np.ndarray,
+    colour: str,
+    line: object,
+    text: str | None,
+    top: float,
+    marker: str = "",
+) -> None:
+    """Median over seeds; a seed that stopped, or reached no goal, counts as needing for ever."""
+    values = np.where(np.isnan(seeds), np.inf, seeds)
+    rng = np.random.default_rng(np.random.SeedSequence(2020))
+    middle, low, high = bootstrap_interval(values, rng=rng, resamples=2_000)
+    axes.fill_between(
+        x,
+        low,
+        np.where(np.isinf(high), top, high),
+        where=np.isfinite(low),
+        color=colour,
+        alpha=0.22,
+        lw=0,
+    )
+    drawn = np.where(np.isinf(middle), np.nan, middle)
+    axes.plot(x, drawn, color=colour, ls=line, marker=marker, ms=4, label=text)
 
 
 def plane_table(policies: dict[str, tuple[Weights, Rollout]]) -> pd.DataFrame:

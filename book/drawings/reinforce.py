@@ -1,6 +1,6 @@
 """Chapter 3: learning curves over those of 2018, and films of the agent before and after."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import gymnasium as gym
 import numpy as np
@@ -10,9 +10,10 @@ from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 from PIL import Image, ImageDraw, ImageFont
 
-from drawings.look import BLACK, BLUE, COLOURS, GREY, LINES, Film, label, median_band
+from drawings.look import BLACK, BLUE, COLOURS, GREY, LINES, Film, label
 from rl_core.evaluation import Rollout
-from studies.reinforce import DRAWN, Curves
+from rl_core.statistics import bootstrap_interval
+from studies.reinforce import DRAWN, EPISODES, Curves
 
 LIMIT = {"Acrobot": 500, "MountainCar": 200}  # Gymnasium's own time limits, for orientation
 
@@ -38,8 +39,7 @@ def learning_curve(curves: Curves, arm: str, original: pd.DataFrame) -> Figure:
     if not learned.all():
         text = f"{(~learned).sum()} that did not (× out of budget)"
         axes.plot([], [], color=BLACK, ls=":", lw=0.8, label=text)
-    text = f"median of all {len(seeds)} seeds, 95% interval"
-    median_band(axes, x, seeds, colour=BLUE, line="-", text=text)
+    _median(axes, x, seeds, BLUE, "-", f"median of all {len(seeds)} seeds, 95% interval")
     axes.set_yscale("log")
     label(axes, x="episode", y="steps to the goal (log scale)")
     axes.legend(fontsize=9)
@@ -54,8 +54,7 @@ def variants(curves: Curves, name: str, names: Mapping[str, str]) -> Figure:
         arm = f"{name}, {variant}"
         learned = curves.learned(arm)
         share = f"{text} ({learned.sum()} of {len(learned)} learned)"
-        steps = curves.smooth[arm][:, DRAWN - 1]
-        median_band(axes, DRAWN, steps, colour=COLOURS[i], line=LINES[i], text=share)
+        _median(axes, DRAWN, curves.smooth[arm][:, DRAWN - 1], COLOURS[i], LINES[i], share)
     axes.axhline(LIMIT[name], color=GREY, lw=0.8, ls="-")
     note = f"Gymnasium's time limit, {LIMIT[name]}"
     axes.text(0, LIMIT[name], note, ha="left", va="bottom", fontsize=8)
@@ -66,22 +65,88 @@ def variants(curves: Curves, name: str, names: Mapping[str, str]) -> Figure:
     return figure
 
 
+def _median(axes, x, seeds, colour, line, text) -> None:
+    """Median over seeds; a seed that stopped counts as needing for ever."""
+    values = np.where(np.isnan(seeds), np.inf, seeds)
+    rng = np.random.default_rng(np.random.SeedSequence(2020))
+    middle, low, high = bootstrap_interval(values, rng=rng, resamples=2_000)
+    top = np.nanmax(seeds)
+    axes.fill_between(
+        x,
+        low,
+        np.where(np.isinf(high), top, high),
+        where=np.isfinite(low),
+        color=colour,
+        alpha=0.22,
+        lw=0,
+    )
+    axes.plot(x, np.where(np.isinf(middle), np.nan, middle), color=colour, ls=line, label=text)
+
+
+def profiles(curves: Curves, variants: Mapping[str, str]) -> Figure:
+    """The share of seeds that need at most so many steps at the end, for each variant."""
+    figure, panels = plt.subplots(1, len(LIMIT), figsize=(6.4, 3.8), sharey=True)
+    for axes, name in zip(panels, LIMIT, strict=True):
+        for i, (variant, text) in enumerate(variants.items()):
+            steps = np.sort(curves.at(f"{name}, {variant}", EPISODES))
+            share = np.arange(1, len(steps) + 1) / len(steps)
+            style = {"color": COLOURS[i], "ls": LINES[i], "drawstyle": "steps-post"}
+            reached = np.isfinite(steps)
+            axes.plot(
+                steps[reached], share[reached], **style, label=text if name == "Acrobot" else None
+            )
+        axes.set(xscale="log", ylim=(0, 1))
+        label(axes, x="steps to the goal (log scale)", y="", title=name)
+    panels[0].set_ylabel("share of seeds with at most so many")
+    figure.legend(loc="outside lower center", ncols=2, fontsize=9)
+    plt.close(figure)
+    return figure
+
+
+def over_reported(
+    curves: Curves, arm: str, others: Mapping[str, Sequence[tuple[np.ndarray, np.ndarray]]]
+) -> Figure:
+    """Some seeds of other arms, each with its episodes and steps, over those as reported."""
+    figure, axes = plt.subplots(figsize=(6.4, 3.8))
+    last = max(x[-1] for seeds in others.values() for x, _ in seeds)
+    shown = DRAWN[last >= DRAWN]
+    for steps in curves.smooth[arm][:, shown - 1]:
+        axes.plot(shown, steps, color=GREY, ls="-", lw=0.4)
+    axes.plot([], [], color=GREY, ls="-", lw=0.8, label="as reported, every seed")
+    for i, (text, seeds) in enumerate(others.items(), 1):
+        for number, (x, steps) in enumerate(seeds):
+            text = text if number == 0 else None
+            axes.plot(x, steps, color=COLOURS[i], ls=LINES[i - 1], lw=1.4, label=text)
+    axes.set_yscale("log")
+    label(axes, x="episode", y="steps to the goal (log scale)")
+    axes.legend(fontsize=9)
+    plt.close(figure)
+    return figure
+
+
 def before_and_after(env_id: str, before: Rollout, after: Rollout, description: str) -> Film:
     """Two episodes side by side: with the initial weights and with the trained ones."""
-    left, right = (_frames(env_id, episode) for episode in (before, after))
-    length = max(len(left), len(right))
+    return side_by_side(env_id, {"before": before, "after": after}, description)
+
+
+def side_by_side(
+    env_id: str, episodes: Mapping[str, Rollout], description: str, smaller: int = 2
+) -> Film:
+    """Episodes side by side, each with its title and step; one that is over stands still."""
+    played = {title: _frames(env_id, one, smaller) for title, one in episodes.items()}
+    length = max(map(len, played.values()))
     pictures = []
     for t in range(0, length + 30, 3):
-        halves = [
-            _titled(frames[min(t, len(frames) - 1)], f"{title}: step {min(t, len(frames) - 1)}")
-            for frames, title in ((left, "before"), (right, "after"))
-        ]
-        pictures.append(np.concatenate(halves, axis=1))
+        parts = []
+        for title, frames in played.items():
+            step = min(t, len(frames) - 1)
+            parts.append(_titled(frames[step], f"{title}: step {step}"))
+        pictures.append(np.concatenate(parts, axis=1))
     return Film(pictures, frames_per_second=15, description=description)
 
 
-def _frames(env_id: str, episode: Rollout) -> list[np.ndarray]:
-    """Play the episode's actions again in Gymnasium, at half size."""
+def _frames(env_id: str, episode: Rollout, smaller: int) -> list[np.ndarray]:
+    """Play the episode's actions again in Gymnasium, so many times smaller."""
     env = gym.make(env_id, render_mode="rgb_array", max_episode_steps=-1)
     env.reset(seed=episode.environment_seed)
     pictures = [env.render()]
@@ -90,7 +155,7 @@ def _frames(env_id: str, episode: Rollout) -> list[np.ndarray]:
         env.step(int(action[0]) if discrete else action)
         pictures.append(env.render())
     env.close()
-    return [np.asarray(Image.fromarray(picture).reduce(2)) for picture in pictures]
+    return [np.asarray(Image.fromarray(picture).reduce(smaller)) for picture in pictures]
 
 
 def _titled(frame: np.ndarray, title: str) -> np.ndarray:

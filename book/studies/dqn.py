@@ -6,7 +6,7 @@ arm of an environment the same budget of environment steps. Budgets, and the set
 changes, were chosen on seeds from 1000 on.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from report.claims import Claim, Criterion, Evidence, Finding
+from report.claims import Claim, Criterion, Evidence, Finding, sensitivity
 from report.seeds import SEEDS
 from rl_core.dqn import DQNConfig, dqn
 from rl_core.evaluation import evaluate, of_values
@@ -27,12 +27,11 @@ from rl_core.statistics import (
     episodes_to_threshold,
     learned,
     learning_curves,
+    probability_of_improvement,
     proportion_interval,
 )
 from rl_core.training import weights_of
 from rl_core.worlds.shaping import Shaping
-from studies import shared
-from studies.shared import interval_text, lower_evidence, median_evidence
 
 EPISODES = 100  # of figures 12 and 13
 BUDGET = {"Acrobot": 25_000, "MountainCar": 45_000}  # environment steps a seed, for the causes
@@ -47,6 +46,7 @@ SHAPING = {
 PARTS = 10  # of a budget, in the curves of steps a goal
 WINDOW = 10  # episodes; "steps at episode k" is a seed's median over the last 10 up to k
 LEARNED = 500  # steps; as in chapter 3
+THRESHOLDS = (200, 250, LEARNED)  # steps a goal, to see what hangs on the choice
 MILESTONES = (20, 50, 100)
 REPORTED = {"Acrobot": 80, "MountainCar": 140}  # steps after 20 episodes
 SECONDS = {"Acrobot": 3, "MountainCar": 5}
@@ -124,15 +124,17 @@ def learn(store: Path) -> Results:
     return run(arms(), seeds=SEEDS, store=store)
 
 
-def steps_a_goal(episodes: pd.DataFrame, name: str, start: float = 0.75, end: float = 1.0) -> float:
+def steps_a_goal(
+    episodes: pd.DataFrame, budget: int, start: float = 0.75, end: float = 1.0
+) -> float:
     """Environment steps of a part of the budget, divided by the goals reached in it.
 
     Parameters
     ----------
     episodes : pandas.DataFrame
         The rows of one seed.
-    name : str
-        The environment.
+    budget : int
+        Environment steps of the seed.
     start, end : float
         The part, as shares of the budget; the last quarter unless told.
 
@@ -141,7 +143,7 @@ def steps_a_goal(episodes: pd.DataFrame, name: str, start: float = 0.75, end: fl
     float
         Infinity if no goal was reached. Episodes that were stopped count with their steps.
     """
-    low, high = start * BUDGET[name], end * BUDGET[name]
+    low, high = start * budget, end * budget
     at = episodes["env_steps"][episodes["terminated"]]
     goals = int(((at > low) & (at <= high)).sum())
     return (high - low) / goals if goals else np.inf
@@ -293,9 +295,9 @@ class Curves:
 
     def steps_a_goal(self, arm: str, start: float = 0.75, end: float = 1.0) -> np.ndarray:
         """Steps a goal of each seed in a part of the budget."""
-        name, rows = arm.partition(",")[0], self.table[arm]
+        budget, rows = BUDGET[arm.partition(",")[0]], self.table[arm]
         of_seed = dict(list(rows.groupby("seed")))
-        return np.array([steps_a_goal(of_seed[seed], name, start, end) for seed in SEEDS])
+        return np.array([steps_a_goal(of_seed[seed], budget, start, end) for seed in SEEDS])
 
     def parts(self, arm: str) -> np.ndarray:
         """Steps a goal of each seed in each tenth of the budget, of shape (seeds, tenths)."""
@@ -308,6 +310,15 @@ class Curves:
         return tuple(proportion_interval(count, len(SEEDS)))
 
 
+def _interval(interval: tuple[float, float, float]) -> str:
+    estimate, low, high = (_steps(x) for x in interval)
+    return f"{estimate} [{low}, {high}]"
+
+
+def _steps(value: float) -> str:
+    return "∞" if np.isinf(value) else f"{value:,.0f}"
+
+
 def milestones(curves: Curves) -> pd.DataFrame:
     """One row an environment: steps at the milestones with intervals, who learned, the capped."""
     rng = np.random.default_rng(np.random.SeedSequence(2018))
@@ -316,7 +327,7 @@ def milestones(curves: Curves) -> pd.DataFrame:
         row = {"arm": arm}
         for episode in MILESTONES:
             interval = bootstrap_interval(curves.at(arm, episode), rng=rng)
-            row[f"steps at {episode}"] = interval_text(interval)
+            row[f"steps at {episode}"] = _interval(interval)
         for episode in (MILESTONES[0], EPISODES):
             count = int(curves.learned(arm, episode).sum())
             row[f"learned by {episode}"] = f"{count} of {len(SEEDS)}"
@@ -334,12 +345,109 @@ def to_the_budget(curves: Curves, variants: Sequence[str]) -> pd.DataFrame:
         for name in ENV:
             arm = f"{name}, {variant}"
             interval = bootstrap_interval(curves.steps_a_goal(arm), rng=rng)
-            row[f"{name}: steps a goal"] = interval_text(interval)
+            row[f"{name}: steps a goal"] = _interval(interval)
             share, low, high = curves.share(arm)
             count = round(share * len(SEEDS))
             row[f"{name}: learned"] = f"{count} of {len(SEEDS)} ({low:.0%} to {high:.0%})"
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def thresholds(of_arm: Mapping[str, np.ndarray]) -> pd.DataFrame:
+    """Count seeds by what a goal costs them: a row an arm, a column a threshold.
+
+    Parameters
+    ----------
+    of_arm : mapping of str to ndarray of shape (seeds,)
+        Steps a goal of each seed in the last quarter of the budget.
+
+    Examples
+    --------
+    >>> thresholds({"a": np.array([190.0, 400.0, np.inf])})
+      arm median  at most 200  at most 250  at most 500
+    0   a    400            1            1            2
+    """
+    rows = []
+    for arm, steps in of_arm.items():
+        counts = {f"at most {most}": int((steps <= most).sum()) for most in THRESHOLDS}
+        rows.append({"arm": arm, "median": _steps(np.median(steps)), **counts})
+    return pd.DataFrame(rows)
+
+
+def mended_alone_or_not(curves: Curves) -> pd.DataFrame:
+    """Seeds that learn when a cause alone is mended, and when all others are: a row a cause."""
+
+    def count(name: str, variant: str) -> str:
+        return f"{round(curves.share(f'{name}, {variant}')[0] * len(SEEDS))} of {len(SEEDS)}"
+
+    rows = [
+        {"cause": rival}
+        | {f"{name}: it alone": count(name, f"original, {rival}") for name in reversed(ENV)}
+        | {f"{name}: all but it": count(name, f"original, all but {rival}") for name in ENV}
+        for rival in RIVALS
+    ]
+    ends = {"none": "original", "all four": "original, all four"}
+    rows += [
+        {"cause": text} | {f"{name}: it alone": count(name, variant) for name in ENV}
+        for text, variant in ends.items()
+    ]
+    order = ["cause", *(f"{name}: {way}" for name in ENV for way in ("it alone", "all but it"))]
+    return pd.DataFrame(rows, columns=order).fillna("")
+
+
+def goals(curves: Curves, arm: str) -> tuple[int, int]:
+    """Return how many seeds saw the goal in their whole budget, and how often all of them did."""
+    of_seed = curves.table[arm].groupby("seed")["terminated"].sum()
+    return int((of_seed > 0).sum()), int(of_seed.sum())
+
+
+def as_trained(results: Results) -> dict[str, dict[float, np.ndarray]]:
+    """Steps of the reported arms' last networks in fresh episodes, by arm and epsilon."""
+    names = [f"{name}, as reported" for name in ENV]
+    return {
+        arm: {epsilon: greedy_steps(results, arm, epsilon=epsilon) for epsilon in (0.0, 0.1)}
+        for arm in names
+    }
+
+
+def about(curves: Curves) -> pd.DataFrame:
+    """What becomes of 3f and 3g where "about" means more, or less."""
+    rng = np.random.default_rng(np.random.SeedSequence(2022))
+    tables = []
+    for claim, (name, steps) in zip(("3f", "3g"), REPORTED.items(), strict=True):
+        at_20 = curves.at(f"{name}, as reported", MILESTONES[0])
+        table = sensitivity(steps, at_20, _evidence(at_20, rng))
+        tables.append(table.assign(claim=claim, about=steps))
+    columns = ["claim", "about", "window", "low", "high", "share", "answer"]
+    return pd.concat(tables, ignore_index=True)[columns]
+
+
+def within(curves: Curves, arm: str, low: float, high: float) -> list[int]:
+    """Seeds of a reported arm whose steps lie between two bounds, at each milestone."""
+    at = (curves.at(arm, episode) for episode in MILESTONES)
+    return [int(((low <= steps) & (steps <= high)).sum()) for steps in at]
+
+
+def engines(name: str, seed: int, store: Path) -> Results:
+    """Train one seed of a reported arm twice: compiled, and by the statement in torch."""
+    config = reported(name)
+    both = [
+        Arm(engine, dqn, ENV[name], replace(config, engine=engine), EPISODES)
+        for engine in ("compiled", "torch")
+    ]
+    return run(both, seeds=[seed], store=store)
+
+
+def same_at_first(one: np.ndarray, other: np.ndarray) -> int:
+    """Episodes from the first one on that took as many steps in two runs.
+
+    Examples
+    --------
+    >>> same_at_first(np.array([9, 8, 7]), np.array([9, 8, 6]))
+    2
+    """
+    different = np.flatnonzero(one != other)
+    return int(different[0]) if len(different) else len(one)
 
 
 def shares(curves: Curves, variants: Sequence[str]) -> pd.DataFrame:
@@ -389,12 +497,23 @@ def random_share(config: DQNConfig, epsilon: float) -> float:
     return steps / (steps + 1 - epsilon)
 
 
-def greedy_steps(results: Results, arm: str, episodes: int = 20, limit: int = 1_000) -> np.ndarray:
-    """Median steps of each seed's greedy policy after learning; infinite if most do not arrive."""
+def greedy_steps(
+    results: Results,
+    arm: str,
+    *,
+    epsilon: float = 0.0,
+    seeds: Sequence[int] = SEEDS,
+    episodes: int = 20,
+    limit: int = 1_000,
+) -> np.ndarray:
+    """Median steps of each seed's policy after learning; infinite if most do not arrive.
+
+    The policy is greedy, or takes a random action with probability `epsilon`.
+    """
     arrays, env = results.arrays(arm), ENV[arm.partition(",")[0]]
     medians = []
-    for position, seed in enumerate(SEEDS):
-        agent = of_values(weights_of(arrays, position))
+    for position, seed in enumerate(seeds):
+        agent = of_values(weights_of(arrays, position), epsilon)
         played = evaluate(env, agent, seed=seed, episodes=episodes, max_steps=limit)
         medians.append(played["steps"].where(played["terminated"], np.inf).median())
     return np.array(medians)
@@ -402,23 +521,32 @@ def greedy_steps(results: Results, arm: str, episodes: int = 20, limit: int = 1_
 
 def wall_clock(results: Results) -> pd.DataFrame:
     """Seconds one seed took, here and in the report."""
-    arms = {
-        f"{name}, as reported": (f"{name}, DQN, {EPISODES} episodes of one seed", seconds)
-        for name, seconds in SECONDS.items()
-    }
-    return shared.wall_clock(results, arms, "now, all (s)")
+    made = results.provenance
+    rows = []
+    for name, seconds in SECONDS.items():
+        of_arm = made[made["arm"] == f"{name}, as reported"]
+        rows.append(
+            {
+                "experiment": f"{name}, DQN, {EPISODES} episodes of one seed",
+                "2018 (s)": seconds,
+                "now (s, mean)": of_arm["seconds"].mean(),
+                "now, all (s)": of_arm["seconds"].sum(),
+                "processor": of_arm["processor"].iloc[0],
+            }
+        )
+    return pd.DataFrame(rows)
 
 
 def median_seed(curves: Curves, arm: str) -> int:
-    """The seed in the middle when all are ordered by their steps at the end."""
+    """Position of the seed in the middle, all ordered by their steps at the end: not a pick."""
     reported_arm = arm in curves.smooth
-    return shared.middle_seed(
-        curves.at(arm, EPISODES) if reported_arm else curves.steps_a_goal(arm)
-    )
+    steps = curves.at(arm, EPISODES) if reported_arm else curves.steps_a_goal(arm)
+    order = np.argsort(steps, kind="stable")
+    return int(order[(len(order) - 1) // 2])
 
 
 def premises(curves: Curves) -> dict[str, bool]:
-    """The sentences with which the chapter ends, and whether the shares of seeds bear them out."""
+    """The sentences of the chapter that lean on the data, and whether the seeds bear them out."""
 
     def share(name: str, variant: str) -> float:
         return curves.share(f"{name}, {variant}")[0]
@@ -439,6 +567,56 @@ def premises(curves: Curves) -> dict[str, bool]:
         "Without replay no more seeds learn, mended or not.": all(
             without <= with_it for with_it, without in replayed
         ),
+        "Without the flag Acrobot is learned.": (
+            share("Acrobot", "original, all but terminal flag") >= 0.75
+        ),
+        "All but the memory is needed on MountainCar.": (
+            max(car(f"original, all but {one}") for one in NOT_MEMORY) <= 0.25
+            and car("original, all but long memory") >= 0.75
+        ),
+    }
+
+
+def premises_of_figure_13(curves: Curves) -> dict[str, bool]:
+    """What is said of the car after its milestone."""
+    arm = "MountainCar, as reported"
+    good = [int((curves.at(arm, episode) <= LEARNED).sum()) for episode in MILESTONES]
+    middle = [float(np.median(curves.at(arm, episode))) for episode in MILESTONES]
+    return {
+        "The car's steps rise again after the milestone.": middle[0] < middle[1] < middle[2],
+        "Some seeds lose what they had learned.": good[2] < good[0],
+    }
+
+
+def premises_of_tricks(curves: Curves) -> dict[str, bool]:
+    """What is said of the discount, of replay and of the fixed target."""
+
+    def count(name: str, trick: str) -> float:
+        return curves.share(f"{name}, {trick}")[0]
+
+    car, swing = partial(count, "MountainCar"), partial(count, "Acrobot")
+    without = {one: curves.steps_a_goal(f"MountainCar, shaped{one}") for one in ("", ", gamma 0.9")}
+    return {
+        "More seeds learn to drive with a discount of 0.9, and better.": (
+            car("shaped") < car("shaped, gamma 0.9")
+            and np.median(without[", gamma 0.9"]) < np.median(without[""])
+        ),
+        "Fewer seeds learn to drive without replay.": car("shaped, no replay") < car("shaped"),
+        "The fixed target matters most on MountainCar.": (
+            car("shaped") - car("shaped, no fixed target")
+            > swing("shaped") - swing("shaped, no fixed target")
+        ),
+    }
+
+
+def premises_of_replay(curves: Curves) -> dict[str, bool]:
+    """What is said of how often the goal is seen where nothing is mended."""
+    seen, met = goals(curves, "MountainCar, original")
+    seen_without, met_without = goals(curves, "MountainCar, original, no replay")
+    return {
+        "Unmended, agents without replay see the flag more often.": (
+            seen < seen_without and met < met_without
+        )
     }
 
 
@@ -448,10 +626,11 @@ def findings(curves: Curves) -> list[Finding]:
 
     def about(arm: str, episode: int) -> tuple[Evidence, Evidence]:
         steps, good = curves.at(arm, episode), curves.learned(arm, episode)
-        return median_evidence(steps, rng), median_evidence(steps[good], rng)
+        return _evidence(steps, rng), _evidence(steps[good], rng)
 
     def better(one: str, other: str, measure: Callable[[str], np.ndarray]) -> Evidence:
-        return lower_evidence(measure(one), measure(other), rng)
+        interval = probability_of_improvement(measure(one), measure(other), rng=rng)
+        return Evidence(*interval, seeds=len(SEEDS))
 
     def share(arm: str) -> Evidence:
         return Evidence(*curves.share(arm), seeds=len(SEEDS))
@@ -482,3 +661,10 @@ def findings(curves: Curves) -> list[Finding]:
         three_k.judge(*k),
         three_l.judge(*cause),
     ]
+
+
+def _evidence(values: np.ndarray, rng: np.random.Generator) -> Evidence:
+    """Median with its interval; for no seeds at all, everything is possible, as in chapter 5."""
+    if len(values) == 0:
+        return Evidence(np.inf, -np.inf, np.inf, seeds=0)
+    return Evidence(*bootstrap_interval(values, rng=rng), seeds=len(values))

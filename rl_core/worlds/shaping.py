@@ -18,7 +18,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from rl_core.imports import code_behind, imported
+from rl_core.identity import code_behind, imported
 from rl_core.kernels.compiled import compiled
 from rl_core.worlds.tasks import _FirstClass
 
