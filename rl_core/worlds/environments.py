@@ -93,6 +93,7 @@ class GymnasiumWorld:
         self.stepper = self
         self._environment = environment
         self._space, self._actions = observations, actions
+        self._shape, self._flat = observations.shape, len(observations.shape) == 1
         self._owned = owned
         self._seed: int | None = None
         self._steps = 0
@@ -121,27 +122,28 @@ class GymnasiumWorld:
             native = action.astype(self._actions.dtype).reshape(self._actions.shape)
         seen, reward, terminated, truncated, _ = self._environment.step(native)
         self._see(seen, following)
-        if type(reward) is not float:
-            reward = checked_reward(self, reward)
-        return reward, bool(terminated), bool(truncated)
+        # float(...) also of numpy's float64, which is a float, the quick way
+        paid = float(reward) if isinstance(reward, float) else checked_reward(self, reward)
+        return paid, bool(terminated), bool(truncated)
 
     def _see(self, seen: Any, following: NDArray[np.float32]) -> None:
         """Write an observation, if it is what its space says: compiled code relies on its size."""
-        # The first line is the quick way through for what an environment should return.
-        if type(seen) is not np.ndarray or seen.shape != self._space.shape:
-            try:
-                seen = np.asarray(seen)
-            except ValueError:
-                seen = np.asarray(None)
-            if seen.shape != self._space.shape:
-                self._refuse(f"came an observation of shape {seen.shape}")
-        if seen.dtype.kind not in "fiub":
-            self._refuse(f"came an observation of type {seen.dtype}")
-        following[:] = seen.ravel()
+        array = type(seen) is np.ndarray
+        if not array or seen.shape != self._shape or seen.dtype.kind not in "fiub":
+            seen = self._numbers(seen)
+        following[:] = seen if self._flat else seen.ravel()
 
-    def _refuse(self, what: str) -> None:
+    def _numbers(self, seen: Any) -> NDArray[Any]:
+        """Return an observation that is no array as one, if its numbers and shape are right."""
+        try:
+            array = np.asarray(seen)
+        except ValueError:  # ragged
+            array = np.asarray(None)
+        if array.shape == self._shape and array.dtype.kind in "fiub":
+            return array
         raise ValueError(
-            f"env must keep to its observation space {self._space}, from {self}, {what}"
+            f"env must keep to its observation space {self._space}, from {self}, came an "
+            f"observation of shape {array.shape} and type {array.dtype}"
         )
 
     def __str__(self) -> str:
