@@ -138,7 +138,7 @@ fresh = study.Curves(fresh_results.table, study.FRESH)
 #
 # This cell is meant to be edited. Here σ is far wider than in any arm; a smaller budget keeps it short.
 
-# %%
+# %% mystnb={"image": {"alt": "Steps an episode of every seed with the reported settings in grey and of two seeds with the changed setting in colour."}}
 changed = replace(reported, policy=Gaussian(mean="weights", sigma=2.0), max_env_steps=1_000_000)
 tried = run(
     [Arm("changed", reinforce, study.ENV, changed, 500)], seeds=range(2), store=RESULTS / "store"
@@ -447,7 +447,7 @@ captioned(
 #
 # Medians over the seeds that learned leave the others out. This figure leaves out none.
 
-# %% tags=["hide-input"] mystnb={"image": {"alt": "Share of seeds that need at most so many steps at episode 5,000, one rising line for each of four arms and their wider and narrower noise."}}
+# %% tags=["hide-input"] mystnb={"image": {"alt": "Share of seeds that need at most so many steps at episode 5,000, one rising line for each of five arms."}}
 PROFILED = (*study.SWEEPS["two observations"], "sigma learned", "gamma 0.9, sigma 0.5")
 shares = causes.profiles(curves, PROFILED, np.arange(100, 1_501, 5))
 shares.to_csv(RESULTS / "figures" / "figure_s5_8.csv", index=False)
