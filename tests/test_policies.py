@@ -71,12 +71,12 @@ def test_an_edited_network_is_another_one(tmp_path, monkeypatch):
         ("toy_networks:nothing", ValueError, "an import path 'module:name', got 'toy_netw"),
         ("toy_networks", ValueError, "an import path 'module:name', got 'toy_netw"),
         ("no_such_module:make", ValueError, "an import path 'module:name', got 'no_such"),
-        ("toy_networks:CONSTANT", ValueError, "a function, got 'toy_networks:CONSTANT'"),
+        ("toy_networks:CONSTANT", ValueError, "callable, got 'toy_networks:CONSTANT'"),
         (toy_networks.make, TypeError, "an import path 'module:name', got <function make"),
     ],
 )
 def test_a_module_that_names_no_function_is_refused(path, kind, message):
-    with pytest.raises(kind, match=f"^network must be {message}"):
+    with pytest.raises(kind, match=f"^function must be {message}"):
         Module(path)
 
 
