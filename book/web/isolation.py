@@ -62,4 +62,6 @@ def environment(given: Mapping[str, str], root: Path = ROOT) -> dict[str, str]:
 
 
 if __name__ == "__main__":
+    # IPython looks whether the folder above its own can be written.
+    (ROOT / ".venv" / "settings").mkdir(parents=True, exist_ok=True)
     os.execvpe(sys.argv[1], sys.argv[1:], environment(os.environ))
