@@ -200,7 +200,7 @@ AMENDMENTS = [
     ),
     Amendment(
         "second edition",
-        "none: sentences of chapter 4",
+        "sentences of chapter 4",
         "five criteria: more budget for biases alone, exploration split in two, the report's "
         "shaping against potentials",
         True,
