@@ -204,10 +204,11 @@ def target(settings: Settings, memory: Memory, slot: int) -> float:
 
     Examples
     --------
+    >>> from rl_core.kernels.replay import make_memory, store
     >>> way = Settings(0.9, 2, 1, 1, 10, 1, 1e-3, True, False, 3)
-    >>> memory, s = replay.make_memory(5, 2), np.ones(2, np.float32)
+    >>> memory, s = make_memory(5, 2), np.ones(2, np.float32)
     >>> for end in (False, True):
-    ...     replay.store(memory, s, 0, -1.0, s, end)
+    ...     store(memory, s, 0, -1.0, s, end)
     >>> memory.next_values[:2] = 10.0
     >>> target(way, memory, 0), target(way, memory, 1)
     (8.0, -1.0)
@@ -230,12 +231,13 @@ def loss_gradient(learner: Learner, memory: Memory) -> float:
 
     Examples
     --------
+    >>> from rl_core.kernels.replay import make_memory, store
     >>> way = Settings(0.9, 2, 1, 1, 10, 1, 1e-3, True, False, 3)
     >>> theta = np.zeros(9, np.float32)
     >>> learner = make_learner((2, 3), theta, way, np.zeros(6), biases=False)
-    >>> memory, s = replay.make_memory(5, 2), np.ones(2, np.float32)
+    >>> memory, s = make_memory(5, 2), np.ones(2, np.float32)
     >>> for reward in (-1.0, -3.0):
-    ...     replay.store(memory, s, 0, reward, s, False)
+    ...     store(memory, s, 0, reward, s, False)
     >>> learner.slots[:] = 0, 1
     >>> loss_gradient(learner, memory)  # (1 + 9) / 2
     5.0
@@ -279,11 +281,12 @@ def update(learner: Any, memory: Memory) -> bool:
 
     Examples
     --------
+    >>> from rl_core.kernels.replay import make_memory, store
     >>> way = Settings(0.9, 2, 1, 1, 1, 1, 1e-3, True, False, 3)  # Adam, a copy at each update
     >>> theta = np.zeros(9, np.float32)
     >>> learner = make_learner((2, 3), theta, way, np.zeros(6), biases=False)
-    >>> memory, s = replay.make_memory(5, 2), np.ones(2, np.float32)
-    >>> replay.store(memory, s, 0, -1.0, s, False)
+    >>> memory, s = make_memory(5, 2), np.ones(2, np.float32)
+    >>> store(memory, s, 0, -1.0, s, False)
     >>> learner.slots[:] = 0
     >>> update(learner, memory)
     True
