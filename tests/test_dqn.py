@@ -627,7 +627,7 @@ def test_the_smallest_settings_are_allowed():
 @given(st.sampled_from([field.name for field in dataclasses.fields(DQNConfig)]), ODD)
 def test_settings_of_any_type_become_plain_or_are_refused_by_name(name, value):
     def make(**settings):
-        return DQNConfig(**{"memory_size": 2**40} | settings)
+        return DQNConfig(**{"memory_size": 2**63 - 1} | settings)
 
     config = try_out(make, name, value)
     if config is not None:
