@@ -37,6 +37,7 @@ from drawings.reinforce import before_and_after
 from report import provenance, settings
 from report.captions import captioned
 from report.claims import details, record, sensitivity, verdicts, what_it_would_take
+from report.figure_data import offer
 from report.listings import listing
 from report.seeds import SEEDS, premise
 from rl_core.evaluation import as_learned, rollout
@@ -143,12 +144,14 @@ changed = replace(reported, policy=Gaussian(mean="weights", sigma=2.0), max_env_
 tried = run(
     [Arm("changed", reinforce, study.ENV, changed, 500)], seeds=range(2), store=RESULTS / "store"
 )
+offer("figure_s5_6", tried.table[["seed", "episode", "steps"]])
 drawings.over_reported(curves, tried.table, "changed")
 
 # %% [markdown]
 # :::{container} caption
 # :name: figure-s5-6
 # **Figure S5.6.** The changed setting over the reported one. Each line is a seed: the median of its last 100 episodes.
+# Data: {download}`CSV <../results/figures/figure_s5_6.csv>`.
 # :::
 #
 # ### The same seed in torch
@@ -162,12 +165,14 @@ glue("parted", parted, display=False)
 for engine, taken in seconds.items():
     glue(f"seconds {engine}", f"{taken:.1f}", display=False)
 premise("the two part", parted > 1)
+offer("figure_s5_7", same_seed.table[["arm", "seed", "episode", "steps"]])
 drawings.engines(same_seed)
 
 # %% [markdown]
 # :::{container} caption
 # :name: figure-s5-7
 # **Figure S5.7.** Seed 0 with σ = 1 through both engines. Processor time: {glue:text}`seconds compiled` s compiled, {glue:text}`seconds torch` s in torch, each once, loading included.
+# Data: {download}`CSV <../results/figures/figure_s5_7.csv>`.
 # :::
 #
 # The two take the same steps up to episode {glue:text}`parted`, in which they first differ. They add the same terms in another order, so the last bits of single-precision sums differ.
