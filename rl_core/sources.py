@@ -40,8 +40,8 @@ def code(modules: Iterable[str], *, loaded: bool = False) -> dict[str, str]:
     Examples
     --------
     >>> from rl_core.sources import code
-    >>> sorted(code(["rl_core.training"]))
-    ['rl_core', 'rl_core.training']
+    >>> sorted(code(["rl_core.checks"]))
+    ['rl_core', 'rl_core.checks']
     """
     waiting = list(modules)
     own = {_top(module) for module in waiting} | {"rl_core"}
