@@ -32,6 +32,7 @@ FILES = {
 INVOLVED = {
     "lab", "lab.learner", "lab.networks", "lab.activations", "lab.lazy", "lab.deep",
     "lab.deep.inner", "lab.constants", "rl_core", "rl_core.training",
+    "rl_core.checks",
 }  # fmt: skip
 
 
