@@ -49,7 +49,7 @@ def test_a_bad_setting_stops_the_import():
 
 
 def test_every_study_uses_the_setting():
-    """But for speed, models and proofs, which stand on no seeds, and causes, on those of chapter 5."""
+    """But for speed, models and proofs, without seeds, and causes, on those of chapter 5."""
     modules = {name: vars(importlib.import_module(f"studies.{name}")) for name in STUDIES}
     without = {study for study, names in modules.items() if names.get("SEEDS") is not SEEDS}
     no_seeds = {"certificate", "fastest", "performance", "potential", "q_learning_world"}
