@@ -1,6 +1,7 @@
 """What a configuration names by import path."""
 
 import math
+import subprocess
 import sys
 import textwrap
 
@@ -66,5 +67,10 @@ def test_code_is_that_of_the_module_and_of_what_it_imports(folder):
 
 
 def test_what_is_installed_is_named_not_read():
-    assert code_behind("torch.nn:Linear") != code_behind("torch.nn.functional:relu")
-    assert "torch._inductor" not in sys.modules  # reading all of torch would have imported it
+    program = """
+import sys
+from rl_core.identity import code_behind
+assert code_behind("torch.nn:Linear") != code_behind("torch.nn.functional:relu")
+assert "torch._inductor" not in sys.modules  # reading all of torch would have imported it
+"""
+    subprocess.run([sys.executable, "-c", program], check=True)
