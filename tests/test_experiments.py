@@ -607,7 +607,7 @@ def test_run_refuses(tmp_path, change, error, message):
     ("change", "message"),
     [
         ({"env": "Pole-v7"}, "env must be an id that Gymnasium knows, got 'Pole-v7'"),
-        ({"env": "nowhere:Foo-v0"}, "env must have a module that can be imported, got 'nowhere:Foo-v0'"),
+        ({"env": "nowhere:Foo-v0"}, "env must have a module that can be imported, got 'nowhere:"),
         ({"env": "MountainCarContinuous-v0"}, "policy must be Gaussian"),
         ({"config": ToyConfig()}, "config must be a ReinforceConfig, got ToyConfig"),
         ({"algorithm": dqn}, "config must be a DQNConfig, got ReinforceConfig"),
