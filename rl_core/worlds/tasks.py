@@ -23,15 +23,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from types import FunctionType, SimpleNamespace
+from types import FunctionType
 from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
-from numba.core import types
+from numba.core import cgutils, types
 from numba.core.registry import CPUDispatcher
 from numba.core.types import boolean, float32, float64, void
 from numba.core.types.npytypes import NumPyRandomGeneratorType
+from numba.experimental.function_type import FunctionModel
+from numba.extending import NativeValue, register_model, unbox
 from numpy.typing import NDArray
 
 from rl_core.checks import fields, instance, integer, optional, require
@@ -44,6 +46,9 @@ Start = Callable[[np.random.Generator, State, Observation], None]
 Step = Callable[[State, Action], tuple[float, bool]]
 Observe = Callable[[State, Observation], None]
 
+# Without these, numba is not typed.
+_parts_of: Any = cgutils.create_struct_proxy
+_NativeValue: Any = NativeValue
 _OUTCOME = types.Tuple((float64, boolean))  # type: ignore[no-untyped-call]
 _SIGNATURES: dict[str, Any] = {
     "start": void(NumPyRandomGeneratorType("npy_rng"), float64[::1], float32[::1]),
@@ -253,6 +258,13 @@ def _check_function(name: str, function: object) -> None:
     require(len(arguments) == wanted, name, f"({', '.join(arguments)})", allowed)
 
 
+class _FirstClassType(types.FunctionType):
+    """Numba's type of functions with one signature, which it would ask slowly at every call."""
+
+
+register_model(_FirstClassType)(FunctionModel)
+
+
 class _FirstClass(CPUDispatcher):
     """A compiled function whose type is its signature, not itself.
 
@@ -260,20 +272,28 @@ class _FirstClass(CPUDispatcher):
     """
 
     _numba_type_: Any = None
+    address = 0
 
     def compile_only(self, signature: Any) -> None:
         """Compile for the one signature that there will be."""
         self.compile(signature)
         self.disable_compile()
-        # Numba asks anew at every call of a loop: keep what takes long to find.
         result: Any = next(iter(self.overloads.values()))
-        address = cache(result.library.get_pointer_to_function)
-        self._result = result._replace(library=SimpleNamespace(get_pointer_to_function=address))
-        self._numba_type_ = types.FunctionType(signature)
+        self.address = result.library.get_pointer_to_function(result.fndesc.llvm_func_name)
+        self._numba_type_ = _FirstClassType(signature)
 
-    def get_compile_result(self, signature: Any) -> Any:
-        """Return where the machine code is."""
-        return self._result
+
+def _unbox(numba_type: Any, function: Any, c: Any) -> Any:
+    """Read where the machine code of a `_FirstClass` is."""
+    found = _parts_of(numba_type)(c.context, c.builder)
+    address = c.pyapi.object_getattr_string(function, "address")
+    found.jit_addr = c.pyapi.long_as_voidptr(address)
+    c.pyapi.decref(address)
+    found.py_addr = c.builder.bitcast(function, found.py_addr.type)
+    return _NativeValue(found._getvalue())
+
+
+unbox(_FirstClassType)(_unbox)  # type: ignore[no-untyped-call]
 
 
 @cache
