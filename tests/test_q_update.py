@@ -80,7 +80,8 @@ def test_targets_by_hand_on_a_terminal_a_truncated_and_an_ordinary_transition(th
         store(memory, np.ones(2, np.float32), 1, -1.0, following, terminated)
     learner.slots[:] = [0, 1, 2]
     loss = q_update.loss_gradient(learner, memory)
-    found = [q_update.target(way, memory, slot) for slot in range(3)]
+    known = zip(memory.rewards, memory.next_values, memory.ends, strict=True)
+    found = [q_update.target(*seen, way.gamma, through_end) for seen in list(known)[:3]]
     ordinary = -1.0 + 0.9 * 9.0
     expected = [ordinary if through_end else -1.0, ordinary, ordinary]
     np.testing.assert_allclose(found, expected)

@@ -218,6 +218,28 @@ def forward_one(
 
 
 @compiled
+def _add_rows(
+    total: NDArray[np.float32], rows: NDArray[np.float32], weights: NDArray[np.float32], n: int
+) -> None:
+    """Add weighted rows to a total one after the other, over n columns: total += w_i x_i.
+
+    Four rows are taken for one reading and writing of the total; the order of the sums is kept.
+    """
+    i = 0
+    while i + 4 <= len(rows):
+        x0, x1, x2, x3 = rows[i], rows[i + 1], rows[i + 2], rows[i + 3]
+        w0, w1, w2, w3 = weights[i], weights[i + 1], weights[i + 2], weights[i + 3]
+        for k in range(n):
+            total[k] = (((total[k] + w0 * x0[k]) + w1 * x1[k]) + w2 * x2[k]) + w3 * x3[k]
+        i += 4
+    while i < len(rows):
+        x, w = rows[i], weights[i]
+        for k in range(n):
+            total[k] += w * x[k]
+        i += 1
+
+
+@compiled
 def forward(
     sizes: NDArray[np.int64],
     parameters: NDArray[np.float32],
@@ -245,11 +267,8 @@ def forward(
             h = units[row + n_in + j]
             for k in range(n):
                 h[k] = parameters[bias + j]
-            for i in range(n_in):
-                weight = parameters[start + j * n_in + i]
-                x = units[row + i]
-                for k in range(n):
-                    h[k] += weight * x[k]
+            weights = parameters[start + j * n_in : start + (j + 1) * n_in]
+            _add_rows(h, units[row : row + n_in], weights, n)
             if layer < last:
                 for k in range(n):
                     h[k] = max(h[k], np.float32(0.0))
@@ -329,11 +348,8 @@ def backward(
             delta_in, h = deltas[row + i], units[row + i]
             for k in range(n):
                 delta_in[k] = np.float32(0.0)
-            for j in range(n_out):
-                weight = parameters[start + j * n_in + i]
-                delta = deltas[row + n_in + j]
-                for k in range(n):
-                    delta_in[k] += weight * delta[k]
+            weights = parameters[start + i : start + n_in * n_out : n_in]
+            _add_rows(delta_in, deltas[row + n_in : row + n_in + n_out], weights, n)
             for k in range(n):
                 delta_in[k] = delta_in[k] if h[k] > np.float32(0.0) else np.float32(0.0)
 

@@ -192,30 +192,25 @@ def _next_values(learner: Learner, memory: Memory) -> None:
 
 
 @compiled
-def target(settings: Settings, memory: Memory, slot: int) -> float:
-    """The target y of the transition in a slot, whose V is up to date.
+def target(reward: float, next_value: float, end: bool, gamma: float, through_end: bool) -> float:
+    """The target y of a transition: r + gamma V, or r where it ends and nothing comes after.
 
     Parameters
     ----------
-    settings : Settings
-        gamma, and whether to bootstrap through the end.
-    memory : Memory
-    slot : int
+    reward, next_value : float
+        r, and V = max_a' Q(s', a'; theta-).
+    end : bool
+        Whether s' is terminal.
+    gamma : float
+    through_end : bool
+        Whether to bootstrap through the end.
 
     Examples
     --------
-    >>> from rl_core.kernels.replay import make_memory, store
-    >>> way = Settings(0.9, 2, 1, 1, 10, 1, 1e-3, True, False, 3)
-    >>> memory, s = make_memory(5, 2), np.ones(2, np.float32)
-    >>> for end in (False, True):
-    ...     store(memory, s, 0, -1.0, s, end)
-    >>> memory.next_values[:2] = 10.0
-    >>> target(way, memory, 0), target(way, memory, 1)
+    >>> target(-1.0, 10.0, False, 0.9, False), target(-1.0, 10.0, True, 0.9, False)
     (8.0, -1.0)
     """
-    if memory.ends[slot] and not settings.through_end:
-        return float(memory.rewards[slot])
-    return float(memory.rewards[slot] + settings.gamma * memory.next_values[slot])
+    return reward if end and not through_end else reward + gamma * next_value
 
 
 @compiled
@@ -254,11 +249,16 @@ def loss_gradient(learner: Learner, memory: Memory) -> float:
     networks.forward(learner.sizes, learner.parameters, units, n_padded)
     values, delta = units[len(units) - n_out :], deltas[len(units) - n_out :]
     delta[:] = 0.0
+    # Taken out of their tuples once: numba would count references to all arrays in them anew.
+    slots, actions, rewards = learner.slots, memory.actions, memory.rewards
+    ends, next_values = memory.ends, memory.next_values
+    gamma, through_end = learner.settings.gamma, learner.settings.through_end
     loss = 0.0
     for k in range(n):
-        slot = learner.slots[k]
-        action = memory.actions[slot]
-        error = values[action, k] - target(learner.settings, memory, slot)
+        slot = slots[k]
+        action = actions[slot]
+        y = target(rewards[slot], next_values[slot], ends[slot], gamma, through_end)
+        error = values[action, k] - y
         delta[action, k] = 2.0 / n * error
         loss += error * error / n
     networks.backward(learner.sizes, learner.parameters, units, deltas, learner.gradient, n_padded)
