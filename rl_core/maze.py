@@ -17,6 +17,7 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from rl_core import checks
+from rl_core.kernels.arrays import F64, I32, Bools
 from rl_core.kernels.compiled import compiled
 from rl_core.mdp import MDP, OwnModel
 from rl_core.worlds.maze_layout import COURSE_LAYOUT, MAX_FLAGS, find, random_layout, read_layout
@@ -112,8 +113,8 @@ class Maze(OwnModel, gym.Env[int, int]):
         self.layout = "".join(f"{row}\n" for row in _joined(letters))
         self.slip = checks.number("slip", slip, 0, 1)
         self.render_mode = render_mode
-        self.walls: NDArray[np.bool_] = letters == "W"
-        self.cells: NDArray[np.int32] = np.argwhere(~self.walls.T)[:, ::-1].astype(np.int32)
+        self.walls: Bools = letters == "W"
+        self.cells: I32 = np.argwhere(~self.walls.T)[:, ::-1].astype(np.int32)
         self.start = find(letters, "S")[0]
         self.goals = tuple(find(letters, "G"))
         self.flag_cells = dict(zip("ABCDEFGHIJKLMNOP", find(letters, "F"), strict=False))
@@ -223,7 +224,7 @@ class Maze(OwnModel, gym.Env[int, int]):
             )
         return self._model
 
-    def reachable_states(self) -> NDArray[np.bool_]:
+    def reachable_states(self) -> Bools:
         """Mark the states an episode can be in, as bool of shape (S,).
 
         The others have the agent on a flag's cell without that flag, or in a walled-off part.
@@ -438,13 +439,13 @@ def _joined(letters: NDArray[np.str_]) -> list[str]:
 
 @compiled
 def _fill(
-    successor: NDArray[np.int32],
-    reward: NDArray[np.float64],
-    landing: NDArray[np.int32],
+    successor: I32,
+    reward: F64,
+    landing: I32,
     collects: NDArray[np.int8],
-    with_flag: NDArray[np.int32],
+    with_flag: I32,
     n_held: NDArray[np.uint8],
-    is_goal: NDArray[np.bool_],
+    is_goal: Bools,
 ) -> None:
     """Write successors and rewards; `reward` comes in as zeros."""
     n_sets = len(n_held)

@@ -15,6 +15,7 @@ from gymnasium import wrappers
 from numpy.typing import ArrayLike, NDArray
 
 from rl_core import checks
+from rl_core.kernels.arrays import F64, I32, Bools
 from rl_core.kernels.bounds import SUM_TOLERANCE
 from rl_core.kernels.compiled import compiled
 from rl_core.worlds.tables import read_table, start_arrays
@@ -102,12 +103,12 @@ class MDP:
     (2, 1, 2)
     """
 
-    successor: NDArray[np.int32]
-    probability: NDArray[np.float64]
-    reward: NDArray[np.float64]
-    terminal: NDArray[np.bool_]
-    start_state: NDArray[np.int32]
-    start_probability: NDArray[np.float64]
+    successor: I32
+    probability: F64
+    reward: F64
+    terminal: Bools
+    start_state: I32
+    start_probability: F64
 
     def __post_init__(self) -> None:
         for name, dtype, ndim in (
@@ -148,7 +149,7 @@ class MDP:
             total += array.itemsize * int(np.prod(held))
         return total
 
-    def reachable_states(self) -> NDArray[np.bool_]:
+    def reachable_states(self) -> Bools:
         """Mark the states some policy can be in: those reached from the start states.
 
         Returns
@@ -367,11 +368,7 @@ def _as_array(name: str, values: ArrayLike, dtype: type[np.generic], ndim: int) 
 
 @compiled
 def _first_fault(
-    successor: NDArray[np.int32],
-    probability: NDArray[np.float64],
-    reward: NDArray[np.float64],
-    terminal: NDArray[np.bool_],
-    tolerance: float,
+    successor: I32, probability: F64, reward: F64, terminal: Bools, tolerance: float
 ) -> tuple[int, int, int, int]:
     """Return the first broken rule with its state, action and slot, or `_SOUND`."""
     n_states, n_actions, n_successors = successor.shape
@@ -397,9 +394,7 @@ def _first_fault(
 
 
 @compiled
-def _reachable(
-    successor: NDArray[np.int32], probability: NDArray[np.float64], start: NDArray[np.int32]
-) -> NDArray[np.bool_]:
+def _reachable(successor: I32, probability: F64, start: I32) -> Bools:
     """Mark what a depth-first search from `start` finds."""
     n_states, n_actions, n_successors = successor.shape
     reached = np.zeros(n_states, dtype=np.bool_)

@@ -17,12 +17,11 @@ from numpy.typing import NDArray
 
 from rl_core.identity import imported
 from rl_core.kernels import networks
+from rl_core.kernels.arrays import F32, Arrays
 from rl_core.policies import MLP, Network
 
 
-def perceptron(
-    sizes: Sequence[int], parameters: NDArray[np.float32], biases: bool = True
-) -> torch.nn.Sequential:
+def perceptron(sizes: Sequence[int], parameters: F32, biases: bool = True) -> torch.nn.Sequential:
     """Build a perceptron over a parameter vector, whose memory it shares.
 
     Linear layers alternate with rectified linear units.
@@ -150,7 +149,7 @@ def reproducible(seed: int = 0) -> Iterator[None]:
         torch.set_deterministic_debug_mode(mode)
 
 
-def as_arrays(module: torch.nn.Module) -> dict[str, NDArray[Any]]:
+def as_arrays(module: torch.nn.Module) -> Arrays:
     """Return a module's parameters and buffers by name, as copies.
 
     Examples

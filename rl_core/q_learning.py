@@ -30,7 +30,7 @@ from typing import Any, NamedTuple
 import gymnasium as gym
 import numpy as np
 from numba.extending import register_jitable
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rl_core.checks import (
     distinct_seeds,
@@ -65,6 +65,7 @@ from rl_core.kernels.appraisal import (
     write_evaluation,
     write_loss,
 )
+from rl_core.kernels.arrays import F64, I64, Arrays
 from rl_core.kernels.choices import EPSILON_GREEDY, choose, step_size
 from rl_core.kernels.compiled import compiled
 from rl_core.mdp import MDP
@@ -77,9 +78,6 @@ from rl_core.worlds.tabular import DiscreteWorld, Draws, Played, start, step
 
 NO_LIMIT = 2**62
 Q_STAR_TOLERANCE = 1e-10
-
-Values = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -413,8 +411,8 @@ class _Task(NamedTuple):
     """The configuration as the loop reads it; schedules laid out over the episodes."""
 
     rule: int
-    parameter: NDArray[np.float64]
-    step_size: NDArray[np.float64]
+    parameter: F64
+    step_size: F64
     exponent: float
     gamma: float
     max_steps: int
@@ -452,9 +450,9 @@ def _learn(
     appraisal: Appraisal,
     draws: Draws,
     trial_draws: Draws,
-    Q: Values,
-    visits: Counts,
-    record: Values,
+    Q: F64,
+    visits: I64,
+    record: F64,
     first: int,
     last: int,
 ) -> int:
@@ -485,13 +483,7 @@ def _learn(
 
 @register_jitable
 def _learn_episode(
-    world: DiscreteWorld,
-    task: _Task,
-    draws: Draws,
-    Q: Values,
-    visits: Counts,
-    k: int,
-    max_steps: int,
+    world: DiscreteWorld, task: _Task, draws: Draws, Q: F64, visits: I64, k: int, max_steps: int
 ) -> tuple[int, float, bool, int]:
     """Learn from episode k; return its steps, return, end and newly visited entries."""
     steps, total, new_entries, terminated, truncated = 0, 0.0, 0, False, False
@@ -511,7 +503,7 @@ def _learn_episode(
 
 
 @register_jitable
-def _try_episode(world: DiscreteWorld, task: _Task, draws: Draws, Q: Values) -> tuple[float, float]:
+def _try_episode(world: DiscreteWorld, task: _Task, draws: Draws, Q: F64) -> tuple[float, float]:
     """Play an episode of the evaluation; return its return and steps."""
     steps, total, terminated, truncated = 0, 0.0, False, False
     s = start(world, draws)
@@ -529,7 +521,7 @@ _learn_compiled = compiled(_learn)
 
 @compiled
 def _update(
-    Q: Values, s: int, a: int, r: float, s_next: int, terminated: bool, alpha: float, gamma: float
+    Q: F64, s: int, a: int, r: float, s_next: int, terminated: bool, alpha: float, gamma: float
 ) -> None:
     """Pull Q(s, a) towards the target r + gamma max_a' Q(s', a')."""
     target = r
@@ -541,11 +533,9 @@ def _update(
     Q[s, a] += alpha * (target - Q[s, a])
 
 
-def _empty_arrays(
-    n_seeds: int, n_snapshots: int, shape: tuple[int, int]
-) -> dict[str, NDArray[Any]]:
+def _empty_arrays(n_seeds: int, n_snapshots: int, shape: tuple[int, int]) -> Arrays:
     """Return tables and counts of zeros for every seed, and room for the snapshots of both."""
-    arrays: dict[str, NDArray[Any]] = {}
+    arrays: Arrays = {}
     for name, dtype in (("Q", np.float64), ("visits", np.int64)):
         arrays[name] = np.zeros((n_seeds, *shape), dtype)
     for name in ("Q", "visits") if n_snapshots else ():
@@ -559,8 +549,8 @@ def _train(
     yardstick: Yardstick,
     seed: int,
     snapshots: Sequence[int],
-    arrays: dict[str, NDArray[Any]],
-    record: Values,
+    arrays: Arrays,
+    record: F64,
 ) -> Failure | None:
     """Run one seed, pausing at the snapshots; return why it failed, if it did."""
     learn = _learn if isinstance(world, Played) else _learn_compiled

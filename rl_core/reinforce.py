@@ -26,15 +26,15 @@ from collections.abc import Callable, Iterable
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from rl_core import modules
 from rl_core.checks import fields, instance, integer, number, one_of, optional, positive, truth
 from rl_core.kernels import likelihood
+from rl_core.kernels.arrays import F32, F64, I64, Arrays
 from rl_core.kernels.compiled import compiled
 from rl_core.kernels.likelihood import Actor, Policy
 from rl_core.policies import (
@@ -123,7 +123,7 @@ class ReinforceConfig:
 
 
 @compiled
-def discounted_returns(rewards: NDArray[np.float64], gamma: float) -> NDArray[np.float64]:
+def discounted_returns(rewards: F64, gamma: float) -> F64:
     """v_t = r_{t+1} + gamma v_{t+1}, backwards from v_T = 0.
 
     Parameters
@@ -149,7 +149,7 @@ def discounted_returns(rewards: NDArray[np.float64], gamma: float) -> NDArray[np
 
 
 @compiled
-def normalised(returns: NDArray[np.float64], centre: bool, scale: bool) -> NDArray[np.float64]:
+def normalised(returns: F64, centre: bool, scale: bool) -> F64:
     """Shift returns to mean 0 if `centre`, and scale them to variance 1 if `scale` as well.
 
     Examples
@@ -159,7 +159,7 @@ def normalised(returns: NDArray[np.float64], centre: bool, scale: bool) -> NDArr
     """
     if not centre:
         return returns
-    deviations: NDArray[np.float64] = returns - returns.mean()
+    deviations: F64 = returns - returns.mean()
     deviation = math.sqrt((deviations * deviations).mean())
     if scale:
         equal = deviation <= 1e-12 * abs(returns.mean())  # up to rounding
@@ -217,13 +217,7 @@ class TorchLearner:
         )
         return -(v * log_pi).mean()
 
-    def learn(
-        self,
-        observations: NDArray[np.float32],
-        actions: NDArray[np.float32],
-        returns: NDArray[np.float64],
-        orders: NDArray[np.int64],
-    ) -> None:
+    def learn(self, observations: F32, actions: F32, returns: F64, orders: I64) -> None:
         """Learn from an episode: a step of the optimiser a minibatch; see `likelihood.learn`."""
         s = torch.from_numpy(with_constant(self.policy, observations))
         a, v = torch.from_numpy(actions), torch.from_numpy(returns).float()
@@ -240,7 +234,7 @@ class _Agent(NamedTuple):
 
     actor: Actor | ModuleActor
     learn: Callable[..., None]
-    arrays: Callable[[], dict[str, NDArray[Any]]]
+    arrays: Callable[[], Arrays]
 
 
 def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator) -> _Agent:
@@ -256,7 +250,7 @@ def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator)
         log_sigma = _log_sigma(config, torch.full((n_sigmas,), start))
         learner = TorchLearner(policy, module, log_sigma, config)
 
-        def by_name() -> dict[str, NDArray[Any]]:
+        def by_name() -> Arrays:
             sigma = {"log_sigma": log_sigma.detach().numpy()} if policy.gaussian else {}
             return {**modules.as_arrays(module), **sigma}
 
@@ -264,7 +258,7 @@ def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator)
     biases = config.network.biases
     parameters = initial_parameters(policy, config.policy, rng)
 
-    def layers() -> dict[str, NDArray[Any]]:
+    def layers() -> Arrays:
         named = likelihood.unpack(policy, parameters)
         return {name: array for name, array in named.items() if biases or "bias" not in name}
 
@@ -288,7 +282,7 @@ def _log_sigma(config: ReinforceConfig, start: torch.Tensor) -> torch.nn.Paramet
     return torch.nn.Parameter(start, requires_grad=learns)
 
 
-def _orders(config: ReinforceConfig, steps: int, rng: np.random.Generator) -> NDArray[np.int64]:
+def _orders(config: ReinforceConfig, steps: int, rng: np.random.Generator) -> I64:
     """Draw the order of the steps in each epoch; where one batch takes all it is of no account."""
     orders = np.tile(np.arange(steps), (config.epochs, 1))
     if steps > config.batch_size:

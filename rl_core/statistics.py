@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import stats
 
 from rl_core.checks import (
@@ -25,6 +25,7 @@ from rl_core.checks import (
     one_of,
     require,
 )
+from rl_core.kernels.arrays import F64, I64, Bools
 from rl_core.kernels.compiled import compiled
 
 Statistic = Callable[..., Any]
@@ -115,7 +116,7 @@ def bootstrap_interval(
 
 def _bootstrap(
     name: str,
-    values: NDArray[np.float64],
+    values: F64,
     statistic: Statistic,
     rng: np.random.Generator,
     level: float,
@@ -269,7 +270,7 @@ def learning_curves(
     episodes: int,
     window: int = 1,
     average: Literal["median", "mean"] = "median",
-) -> NDArray[np.float64]:
+) -> F64:
     """Return a column of one arm's table as one curve a seed, smoothed over the last episodes.
 
     Parameters
@@ -337,7 +338,7 @@ def learning_curves(
     return curves
 
 
-def learned(curves: ArrayLike, threshold: float, *, window: int) -> NDArray[np.bool_]:
+def learned(curves: ArrayLike, threshold: float, *, window: int) -> Bools:
     """Return which seeds learn: the median over the last `window` episodes is at most `threshold`.
 
     Parameters
@@ -373,9 +374,7 @@ def learned(curves: ArrayLike, threshold: float, *, window: int) -> NDArray[np.b
         return np.asarray(np.median(curves[:, -window:], axis=1) <= threshold)
 
 
-def episodes_to_threshold(
-    curves: ArrayLike, threshold: float, *, hold: int = 1
-) -> NDArray[np.float64]:
+def episodes_to_threshold(curves: ArrayLike, threshold: float, *, hold: int = 1) -> F64:
     """Return the episode from which each seed stays at or below `threshold` for `hold` episodes.
 
     Parameters
@@ -411,12 +410,7 @@ def episodes_to_threshold(
 
 
 @compiled
-def _trimmed_means(
-    ordered: NDArray[np.float64],
-    order: NDArray[np.int64],
-    counts: NDArray[np.int64],
-    trim: int,
-) -> NDArray[np.float64]:
+def _trimmed_means(ordered: F64, order: I64, counts: I64, trim: int) -> F64:
     """Return the trimmed mean of each draw at each point, shape (points, resamples).
 
     Row p of `ordered` has the values of point p in order, and of `order` the seeds they belong to.
@@ -451,12 +445,12 @@ def _trim(statistic: Statistic, n: int) -> int:
     raise ValueError(f"statistic must be np.median, np.mean or iqm, got {statistic!r}")
 
 
-def _seed_counts(n_seeds: int, resamples: int, rng: np.random.Generator) -> NDArray[np.int64]:
+def _seed_counts(n_seeds: int, resamples: int, rng: np.random.Generator) -> I64:
     """Return how often each seed is drawn: n draws with replacement, shape (resamples, seeds)."""
     return rng.multinomial(n_seeds, np.full(n_seeds, 1 / n_seeds), size=resamples)
 
 
-def _limits(drawn: NDArray[np.float64], level: float) -> tuple[Any, Any]:
+def _limits(drawn: F64, level: float) -> tuple[Any, Any]:
     """Return the percentile limits over the last axis, as values that occur.
 
     No interpolation, because between two infinities there is no number. A draw that is none, since
@@ -478,7 +472,7 @@ def _interval(estimate: Any, low: Any, high: Any) -> Interval:
 
 def _averaged(
     name: str,
-    values: NDArray[np.float64],
+    values: F64,
     statistic: Statistic,
     *trim: float,
     axis: int,
@@ -498,7 +492,7 @@ def _averaged(
     return np.where(unknown, np.nan, middle)
 
 
-def _array(name: str, values: ArrayLike, *dimensions: int) -> NDArray[np.float64]:
+def _array(name: str, values: ArrayLike, *dimensions: int) -> F64:
     """Return numbers as float64, not empty; NaN stands for what is missing."""
     try:
         given = np.asarray(values)

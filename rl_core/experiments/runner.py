@@ -28,7 +28,6 @@ import numpy as np
 import pandas as pd
 from joblib.externals.loky import get_reusable_executor
 from joblib.parallel import BACKENDS, EXTERNAL_BACKENDS
-from numpy.typing import NDArray
 
 from rl_core.checks import distinct_seeds, instance, integer, one_of, optional, require
 from rl_core.experiments.arms import Arm
@@ -36,6 +35,7 @@ from rl_core.experiments.progress import Progress
 from rl_core.experiments.store import DamagedResultError, Store, Stored, scratch, sweep
 from rl_core.experiments.workers import Outcome, Task, run_task, use_threads
 from rl_core.identity import canonical_json, digest
+from rl_core.kernels.arrays import Arrays
 
 TEMPORARY = "rl_core-"  # what joblib's temporary folders are called
 
@@ -66,7 +66,7 @@ class Results:
     provenance: pd.DataFrame
     _store: Store = field(repr=False)
 
-    def arrays(self, arm: str) -> dict[str, NDArray[Any]]:
+    def arrays(self, arm: str) -> Arrays:
         """Return what the seeds of `arm` learned: each array's first axis is the seed.
 
         Raises

@@ -31,6 +31,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from rl_core.kernels.arrays import Arrays
 from rl_core.training import Failure
 
 _fcntl: Any = importlib.import_module("fcntl") if os.name == "posix" else None
@@ -141,7 +142,7 @@ class Store:
             provenance=record["provenance"],
         )
 
-    def read_arrays(self, digest: str) -> dict[str, NDArray[Any]]:
+    def read_arrays(self, digest: str) -> Arrays:
         """Return the arrays of the result under `digest`, bit for bit as they were written.
 
         Raises

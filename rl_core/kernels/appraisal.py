@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from rl_core.kernels.arrays import F64, I32, I64, Bools
 from rl_core.kernels.compiled import compiled
 
 TOLERANCE = 1e-12
@@ -54,15 +54,15 @@ class Yardstick(NamedTuple):
         The model; see `rl_core.mdp.MDP`.
     """
 
-    Q_star: NDArray[np.float64]
-    optimal: NDArray[np.bool_]
-    visitable: NDArray[np.bool_]
-    successor: NDArray[np.int32]
-    probability: NDArray[np.float64]
-    reward: NDArray[np.float64]
-    terminal: NDArray[np.bool_]
-    start_state: NDArray[np.int32]
-    start_probability: NDArray[np.float64]
+    Q_star: F64
+    optimal: Bools
+    visitable: Bools
+    successor: I32
+    probability: F64
+    reward: F64
+    terminal: Bools
+    start_state: I32
+    start_probability: F64
 
 
 class Appraisal(NamedTuple):
@@ -85,11 +85,11 @@ class Appraisal(NamedTuple):
         The value lost.
     """
 
-    greedy: NDArray[np.bool_]
-    order: NDArray[np.int32]
-    found: NDArray[np.int64]
-    V: NDArray[np.float64]
-    lost: NDArray[np.float64]
+    greedy: Bools
+    order: I32
+    found: I64
+    V: F64
+    lost: F64
 
 
 def new_appraisal(yardstick: Yardstick) -> Appraisal:
@@ -134,7 +134,7 @@ class Errors(NamedTuple):
     optimal_states: float
 
 
-def empty_record(n_seeds: int, episodes: int) -> NDArray[np.float64]:
+def empty_record(n_seeds: int, episodes: int) -> F64:
     """Return the record that a learner fills: float64 of shape (seeds, episodes, columns).
 
     >>> empty_record(2, 5).shape == (2, 5, len(COLUMNS))
@@ -143,7 +143,7 @@ def empty_record(n_seeds: int, episodes: int) -> NDArray[np.float64]:
     return np.full((n_seeds, episodes, len(COLUMNS)), np.nan)
 
 
-def as_table(record: NDArray[np.float64], seeds: Sequence[int]) -> pd.DataFrame:
+def as_table(record: F64, seeds: Sequence[int]) -> pd.DataFrame:
     """Return a record as a tidy table: `seed`, `episode`, `COLUMNS`; rows never written left out.
 
     >>> as_table(empty_record(1, 5), seeds=[0]).shape == (0, 2 + len(COLUMNS))
@@ -160,7 +160,7 @@ def as_table(record: NDArray[np.float64], seeds: Sequence[int]) -> pd.DataFrame:
     return pd.DataFrame(table)
 
 
-def env_steps(record: NDArray[np.float64]) -> int:
+def env_steps(record: F64) -> int:
     """Return the environment steps of all seeds so far.
 
     >>> env_steps(empty_record(2, 5))
@@ -170,18 +170,14 @@ def env_steps(record: NDArray[np.float64]) -> int:
 
 
 @compiled
-def steps_so_far(record: NDArray[np.float64], k: int) -> int:
+def steps_so_far(record: F64, k: int) -> int:
     """Return the environment steps of one seed before episode k (from 0)."""
     return int(record[k - 1, _ENV_STEPS]) if k > 0 else 0
 
 
 @compiled
 def write_episode(
-    record: NDArray[np.float64],
-    k: int,
-    outcome: tuple[int, float, bool, int],
-    Q: NDArray[np.float64],
-    yardstick: Yardstick,
+    record: F64, k: int, outcome: tuple[int, float, bool, int], Q: F64, yardstick: Yardstick
 ) -> None:
     """Write the row of episode k (from 0) of one seed; running counts go on from the row before.
 
@@ -198,19 +194,14 @@ def write_episode(
 
 @compiled
 def write_loss(
-    record: NDArray[np.float64],
-    k: int,
-    Q: NDArray[np.float64],
-    yardstick: Yardstick,
-    gamma: float,
-    appraisal: Appraisal,
+    record: F64, k: int, Q: F64, yardstick: Yardstick, gamma: float, appraisal: Appraisal
 ) -> None:
     """Add to the row of episode k the value that the greedy policy loses."""
     record[k, _VALUE_LOST] = value_lost(Q, yardstick, gamma, appraisal)
 
 
 @compiled
-def write_evaluation(record: NDArray[np.float64], k: int, trials: NDArray[np.float64]) -> None:
+def write_evaluation(record: F64, k: int, trials: F64) -> None:
     """Add to the row of episode k the evaluation's mean return and steps.
 
     `trials` has a row (return, steps) for each of the evaluation's episodes.
@@ -220,7 +211,7 @@ def write_evaluation(record: NDArray[np.float64], k: int, trials: NDArray[np.flo
 
 
 @compiled
-def errors(Q: NDArray[np.float64], yardstick: Yardstick) -> Errors:
+def errors(Q: F64, yardstick: Yardstick) -> Errors:
     """Measure Q, float64 of shape (S, A), in one pass.
 
     Examples
@@ -257,9 +248,7 @@ def errors(Q: NDArray[np.float64], yardstick: Yardstick) -> Errors:
 
 
 @compiled
-def value_lost(
-    Q: NDArray[np.float64], yardstick: Yardstick, gamma: float, appraisal: Appraisal
-) -> float:
+def value_lost(Q: F64, yardstick: Yardstick, gamma: float, appraisal: Appraisal) -> float:
     """Return v*(s_0) - v_pi(s_0) for the greedy policy pi, which draws among ties uniformly.
 
     Averaged over the start states. NaN if Q* or the model is not known, or if the values do not
@@ -301,7 +290,7 @@ def value_lost(
 
 
 @compiled
-def _as_before(Q: NDArray[np.float64], appraisal: Appraisal) -> bool:
+def _as_before(Q: F64, appraisal: Appraisal) -> bool:
     """Say whether the greedy policy takes the same actions in all states it can get to."""
     for i in range(appraisal.found[0]):
         s = appraisal.order[i]
@@ -313,7 +302,7 @@ def _as_before(Q: NDArray[np.float64], appraisal: Appraisal) -> bool:
 
 
 @compiled
-def _follow(Q: NDArray[np.float64], yardstick: Yardstick, appraisal: Appraisal) -> None:
+def _follow(Q: F64, yardstick: Yardstick, appraisal: Appraisal) -> None:
     """Note which non-terminal states the greedy policy can get to, and what it does there."""
     known = np.zeros(len(yardstick.terminal), dtype=np.bool_)
     order, n_found, n_searched = appraisal.order, 0, 0
@@ -359,13 +348,7 @@ def _loss(yardstick: Yardstick, gamma: float, appraisal: Appraisal) -> float:
 
 
 @compiled
-def _backup(
-    V: NDArray[np.float64],
-    greedy: NDArray[np.bool_],
-    yardstick: Yardstick,
-    gamma: float,
-    s: int,
-) -> float:
+def _backup(V: F64, greedy: Bools, yardstick: Yardstick, gamma: float, s: int) -> float:
     """Return sum_a pi(a | s) sum_k p_k (r_k + gamma V(s'_k)) for the greedy policy pi."""
     total, ties = 0.0, 0
     for a in range(greedy.shape[1]):

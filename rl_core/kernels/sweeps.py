@@ -16,8 +16,8 @@ import heapq
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rl_core.kernels.arrays import F64, I32, I64, Bools, Ints
 from rl_core.kernels.compiled import compiled
 
 TIE = 1e-10
@@ -44,12 +44,12 @@ class Transitions(NamedTuple):
         `own_rows * s`.
     """
 
-    successor: NDArray[np.int32]
-    probability: NDArray[np.float64]
+    successor: I32
+    probability: F64
     own_rows: int
 
 
-def transitions(successor: NDArray[np.int32], probability: NDArray[np.float64]) -> Transitions:
+def transitions(successor: I32, probability: F64) -> Transitions:
     """Return them as the kernels take them: probabilities that all states share are given once."""
     shared = probability.strides[0] == 0 and len(probability) > 1
     rows = np.ascontiguousarray(probability[:1] if shared else probability)
@@ -58,11 +58,7 @@ def transitions(successor: NDArray[np.int32], probability: NDArray[np.float64]) 
 
 @compiled
 def lookahead(
-    transitions: Transitions,
-    reward: NDArray[np.float64],
-    gamma: float,
-    V: NDArray[np.float64],
-    Q: NDArray[np.float64],
+    transitions: Transitions, reward: F64, gamma: float, V: F64, Q: F64
 ) -> tuple[float, float]:
     """Write Q(s, a) = Σ_k p_k (r_k + γ V(s'_k)) over Q; return the change, largest and squared."""
     successor, probability, own_rows = transitions
@@ -83,9 +79,7 @@ def lookahead(
 
 
 @compiled
-def greedy(
-    Q: NDArray[np.float64], V: NDArray[np.float64], policy: NDArray[np.signedinteger]
-) -> tuple[float, float, int]:
+def greedy(Q: F64, V: F64, policy: Ints) -> tuple[float, float, int]:
     """Write V(s) = max_a Q(s, a) and the lowest action that attains it (ties: `TIE`).
 
     Returns the largest change and the sum of squared changes of V, and the number of states whose
@@ -111,12 +105,7 @@ def greedy(
 
 
 @compiled
-def expected_rewards(
-    transitions: Transitions,
-    reward: NDArray[np.float64],
-    order: NDArray[np.int32],
-    r: NDArray[np.float64],
-) -> float:
+def expected_rewards(transitions: Transitions, reward: F64, order: I32, r: F64) -> float:
     """Write r(i, a) = Σ_k p_k r_k of state order[i]; return the largest |r_k|."""
     _, probability, own_rows = transitions
     n_states, n_actions, n_successors = reward.shape
@@ -133,7 +122,7 @@ def expected_rewards(
 
 
 @compiled
-def _main_slot(probability: NDArray[np.float64], row: int, a: int) -> int:
+def _main_slot(probability: F64, row: int, a: int) -> int:
     """Return the slot of the likeliest successor (of several, the first)."""
     main = 0
     for k in range(1, probability.shape[2]):
@@ -143,7 +132,7 @@ def _main_slot(probability: NDArray[np.float64], row: int, a: int) -> int:
 
 
 @compiled
-def count_predecessors(transitions: Transitions, first: NDArray[np.int64]) -> None:
+def count_predecessors(transitions: Transitions, first: I64) -> None:
     """Write where each state's list of predecessors will begin: that of s at first[s + 1].
 
     Filling the list moves first[s + 1] to its end, so that afterwards it is first[s]..first[s + 1].
@@ -161,12 +150,7 @@ def count_predecessors(transitions: Transitions, first: NDArray[np.int64]) -> No
 
 
 @compiled
-def link_predecessors(
-    transitions: Transitions,
-    first: NDArray[np.int64],
-    predecessor: NDArray[np.int32],
-    action: NDArray[np.signedinteger],
-) -> None:
+def link_predecessors(transitions: Transitions, first: I64, predecessor: I32, action: Ints) -> None:
     """Fill the lists: for every state, the other states and actions that most likely lead to it."""
     successor, probability, own_rows = transitions
     n_states, n_actions, _ = successor.shape
@@ -180,9 +164,7 @@ def link_predecessors(
 
 
 @compiled
-def _sources(
-    r: NDArray[np.float64], terminal: NDArray[np.bool_], V: NDArray[np.float64]
-) -> list[tuple[float, np.int32]]:
+def _sources(r: F64, terminal: Bools, V: F64) -> list[tuple[float, np.int32]]:
     """Give states that need no successor to have a value one; return (-value, state) as a heap.
 
     Terminal states are worth 0; a state with a positive reward at hand at least that reward. The
@@ -204,16 +186,16 @@ def _sources(
 @compiled
 def best_first(
     transitions: Transitions,
-    r: NDArray[np.float64],
-    terminal: NDArray[np.bool_],
+    r: F64,
+    terminal: Bools,
     gamma: float,
-    first: NDArray[np.int64],
-    predecessor: NDArray[np.int32],
-    action: NDArray[np.signedinteger],
-    V: NDArray[np.float64],
-    order: NDArray[np.int32],
-    queue: NDArray[np.int32],
-    settled: NDArray[np.bool_],
+    first: I64,
+    predecessor: I32,
+    action: Ints,
+    V: F64,
+    order: I32,
+    queue: I32,
+    settled: Bools,
 ) -> None:
     """Estimate V and write the states by falling estimate into `order` (Dijkstra's search).
 
@@ -260,12 +242,7 @@ def best_first(
 
 
 @compiled
-def rearrange(
-    transitions: Transitions,
-    order: NDArray[np.int32],
-    rank: NDArray[np.int32],
-    ordered: Transitions,
-) -> None:
+def rearrange(transitions: Transitions, order: I32, rank: I32, ordered: Transitions) -> None:
     """Write the transitions with the states renumbered: order[i] becomes i, rank its inverse."""
     successor, probability, own_rows = transitions
     n_states, n_actions, n_successors = successor.shape
@@ -280,12 +257,7 @@ def rearrange(
 
 
 def in_order(
-    transitions: Transitions,
-    r: NDArray[np.float64],
-    terminal: NDArray[np.bool_],
-    gamma: float,
-    order: NDArray[np.int32],
-    V: NDArray[np.float64],
+    transitions: Transitions, r: F64, terminal: Bools, gamma: float, order: I32, V: F64
 ) -> Transitions:
     """Return the transitions in the order of the sweeps, in which i stands for state order[i].
 
@@ -317,11 +289,11 @@ def in_order(
 @compiled
 def improvement_sweep(
     transitions: Transitions,
-    r: NDArray[np.float64],
+    r: F64,
     gamma: float,
-    V: NDArray[np.float64],
-    policy: NDArray[np.signedinteger],
-    chosen: NDArray[np.int32],
+    V: F64,
+    policy: Ints,
+    chosen: I32,
     backward: bool,
 ) -> tuple[float, float, int, float]:
     """Set V(s) = max_a q(s, a) in place, state after state, and note the action and successors.
@@ -369,12 +341,7 @@ def improvement_sweep(
 
 @compiled
 def evaluation_sweep(
-    transitions: Transitions,
-    r: NDArray[np.float64],
-    gamma: float,
-    V: NDArray[np.float64],
-    policy: NDArray[np.signedinteger],
-    chosen: NDArray[np.int32],
+    transitions: Transitions, r: F64, gamma: float, V: F64, policy: Ints, chosen: I32
 ) -> tuple[float, float]:
     """Set V(s) = q(s, policy(s)) in place: `improvement_sweep` for one action a state.
 

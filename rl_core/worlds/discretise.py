@@ -24,9 +24,10 @@ from typing import Any, NamedTuple
 import gymnasium
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rl_core.checks import floats, instance, integer, integers, require
+from rl_core.kernels.arrays import F32, F64, I64
 from rl_core.kernels.compiled import compiled
 from rl_core.worlds.environments import EnvironmentLike, checked_reward, opened
 from rl_core.worlds.names import find
@@ -47,9 +48,9 @@ class Grid(NamedTuple):
         Bins in every dimension.
     """
 
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
-    bins: NDArray[np.int64]
+    low: F64
+    high: F64
+    bins: I64
 
     @property
     def n_cells(self) -> int:
@@ -126,7 +127,7 @@ def checked_bins(name: str, bins: object) -> int | tuple[int, ...]:
 
 
 @compiled
-def cell(grid: Grid, observation: NDArray[np.float32]) -> int:
+def cell(grid: Grid, observation: F32) -> int:
     """Number of the cell that an observation falls into, from 0.
 
     An infinity falls into the last or the first bin, like any number beyond the bounds.
@@ -152,7 +153,7 @@ def cell(grid: Grid, observation: NDArray[np.float32]) -> int:
     return index
 
 
-def action_levels(space: spaces.Space[Any], levels: int | None) -> NDArray[np.float32]:
+def action_levels(space: spaces.Space[Any], levels: int | None) -> F32:
     """Actions to choose from: all of a Discrete space, or a grid over a Box.
 
     Parameters
@@ -297,8 +298,8 @@ class GriddedTask(NamedTuple):
 
     kernel: Kernel
     grid: Grid
-    actions: NDArray[np.float32]
-    observation: NDArray[np.float32]
+    actions: F32
+    observation: F32
     max_steps: int
 
     @property

@@ -20,6 +20,7 @@ from gymnasium import spaces
 from numba.extending import overload
 from numpy.typing import NDArray
 
+from rl_core.kernels.arrays import F32
 from rl_core.kernels.compiled import compiled
 from rl_core.worlds.names import Make, find, make_environment
 from rl_core.worlds.tasks import Kernel, Task
@@ -52,7 +53,7 @@ class TaskWorld:
         """Start the environment's stream, the one Gymnasium makes of this seed."""
         self._rng = np.random.default_rng(environment_seed)
 
-    def reset(self) -> NDArray[np.float32]:
+    def reset(self) -> F32:
         """Begin an episode; return its first observation."""
         observation = np.empty(self.n_observations, np.float32)
         self._task.start(self._rng, self.stepper.state, observation)
@@ -102,7 +103,7 @@ class GymnasiumWorld:
         """Seed the environment at its next reset."""
         self._seed = environment_seed
 
-    def reset(self) -> NDArray[np.float32]:
+    def reset(self) -> F32:
         """Begin an episode; return its first observation."""
         observation, _ = self._environment.reset(seed=self._seed)
         self._seed, self._steps = None, 0
@@ -110,9 +111,7 @@ class GymnasiumWorld:
         self._see(observation, first)
         return first
 
-    def step(
-        self, action: NDArray[np.float32], following: NDArray[np.float32]
-    ) -> tuple[float, bool, bool]:
+    def step(self, action: F32, following: F32) -> tuple[float, bool, bool]:
         """Take one step; see `step`."""
         self._steps += 1
         native: Any
@@ -126,7 +125,7 @@ class GymnasiumWorld:
         paid = float(reward) if isinstance(reward, float) else checked_reward(self, reward)
         return paid, bool(terminated), bool(truncated)
 
-    def _see(self, seen: Any, following: NDArray[np.float32]) -> None:
+    def _see(self, seen: Any, following: F32) -> None:
         """Write an observation, if it is what its space says: compiled code relies on its size."""
         array = type(seen) is np.ndarray
         if not array or seen.shape != self._shape or seen.dtype.kind not in "fiub":
@@ -179,9 +178,7 @@ def checked_reward(env: object, reward: Any) -> float:
     return float(number)
 
 
-def step(
-    stepper: Kernel | GymnasiumWorld, action: NDArray[np.float32], following: NDArray[np.float32]
-) -> tuple[float, bool, bool]:
+def step(stepper: Kernel | GymnasiumWorld, action: F32, following: F32) -> tuple[float, bool, bool]:
     """Take one step of a world.
 
     Parameters
@@ -212,9 +209,7 @@ def step(
 
 
 @compiled
-def _step_task(
-    kernel: Kernel, action: NDArray[np.float32], following: NDArray[np.float32]
-) -> tuple[float, bool, bool]:
+def _step_task(kernel: Kernel, action: F32, following: F32) -> tuple[float, bool, bool]:
     reward, terminated = kernel.step(kernel.state, action)
     kernel.observe(kernel.state, following)
     return reward, terminated, False

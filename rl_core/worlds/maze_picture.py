@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from rl_core.kernels.arrays import Bools
+
 Cell = tuple[int, int]
 Colour = tuple[int, int, int]
 
@@ -35,7 +37,7 @@ WALL = (60, 60, 60)
 
 
 def draw_maze(
-    walls: NDArray[np.bool_],
+    walls: Bools,
     start: Cell,
     goals: Iterable[Cell],
     flag_cells: Mapping[str, Cell],

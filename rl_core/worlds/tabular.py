@@ -18,8 +18,8 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from numba.extending import overload
-from numpy.typing import NDArray
 
+from rl_core.kernels.arrays import F64, I32, Bools
 from rl_core.kernels.compiled import compiled
 from rl_core.mdp import MDP
 from rl_core.worlds.discretise import GriddedTask, start_gridded, step_gridded
@@ -59,12 +59,12 @@ def spawn_draws(seed: int, n: int) -> list[Draws]:
 class Model(NamedTuple):
     """An `MDP` as compiled code steps through it: with cumulative probabilities."""
 
-    successor: NDArray[np.int32]
-    cumulative: NDArray[np.float64]
-    reward: NDArray[np.float64]
-    terminal: NDArray[np.bool_]
-    start_state: NDArray[np.int32]
-    start_cumulative: NDArray[np.float64]
+    successor: I32
+    cumulative: F64
+    reward: F64
+    terminal: Bools
+    start_state: I32
+    start_cumulative: F64
 
 
 def model_arrays(mdp: MDP) -> Model:
@@ -195,7 +195,7 @@ def _step_in_grid(world: GriddedTask, a: int) -> tuple[int, float, bool, bool]:
 
 
 @compiled
-def _slot(cumulative: NDArray[np.float64], u: float) -> int:
+def _slot(cumulative: F64, u: float) -> int:
     """Return the first slot whose cumulative probability exceeds u, as Gymnasium does."""
     for k in range(len(cumulative)):
         if cumulative[k] > u:
