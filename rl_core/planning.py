@@ -133,7 +133,7 @@ def q_value_iteration(
     [0.733, 0.863, 0.821, 0.781]
     """
     gamma, transitions, reward = _opened(mdp, gamma)
-    threshold = checks.number("threshold", threshold, above=0)
+    threshold = checks.positive("threshold", threshold)
     limit = checks.optional("max_sweeps", max_sweeps, checks.integer, 1) or math.inf
     Q, V, policy = _blank(mdp)
     largest, norm = _largest(reward, gamma), math.inf
@@ -217,16 +217,15 @@ def value_iteration(
     (np.float64(0.542026), True)
     """
     gamma, transitions, reward = _opened(mdp, gamma)
-    tolerance = checks.number("tolerance", tolerance, above=0)
+    tolerance = checks.positive("tolerance", tolerance)
     Q, V, policy = _blank(mdp)
-    order = np.arange(mdp.n_states, dtype=np.int32)
-    magnitude = sweeps.expected_rewards(transitions, reward, order, Q)  # Q is r(s, a) for now
+    magnitude = sweeps.expected_rewards(transitions, reward, Q)  # Q is r(s, a) for now
     bounds.check_returns("mdp", magnitude, gamma)
     bound = error_bound(magnitude, gamma, rounding_error(mdp.n_successors, magnitude))
     with _recording("value iteration", progress) as record:
         if bound > tolerance:  # else V = 0 will do
+            order = np.empty(mdp.n_states, dtype=np.int32)
             ordered = sweeps.in_order(transitions, Q, mdp.terminal, gamma, order, V)
-            sweeps.expected_rewards(transitions, reward, order, Q)
             bound = _sweep(mdp, ordered, Q, gamma, tolerance, V, policy, magnitude, record)
             del ordered
             V[order], policy[order] = V.copy(), policy.copy()
@@ -337,7 +336,7 @@ def policy_iteration(
     (np.float64(0.542026), 0)
     """
     gamma, transitions, reward = _opened(mdp, gamma)
-    threshold = checks.optional("evaluation_threshold", evaluation_threshold, _above_zero)
+    threshold = checks.optional("evaluation_threshold", evaluation_threshold, checks.positive)
     largest = _largest(reward, gamma)
     Q, V, policy = _blank(mdp)
     first = 0  # backups before the first round
@@ -594,10 +593,6 @@ def _largest(reward: F64, gamma: float) -> float:
 def _magnitude(values: F64) -> float:
     """Return the largest absolute value, without an array of them all."""
     return max(abs(float(values.max())), abs(float(values.min())))
-
-
-def _above_zero(name: str, value: object) -> float:
-    return checks.number(name, value, above=0)
 
 
 def _action_values(Q: ArrayLike) -> F64:
