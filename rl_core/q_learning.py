@@ -32,17 +32,7 @@ import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import ArrayLike
 
-from rl_core.checks import (
-    distinct_seeds,
-    fields,
-    floats,
-    instance,
-    integer,
-    integers,
-    number,
-    optional,
-    require,
-)
+from rl_core import checks
 from rl_core.exploration import (
     EpsilonGreedy,
     ExplorationRule,
@@ -127,19 +117,19 @@ class QLearningConfig:
 
     def __post_init__(self) -> None:
         rules = "EpsilonGreedy(...), Softmax(...) or UnnormalisedSoftmax()"
-        fields(
+        checks.fields(
             self,
-            gamma=(number, 0, 1),
+            gamma=(checks.number, 0, 1),
             step_size=(_checked_step_size,),
-            exploration=(instance, ExplorationRule, rules),
-            max_steps=(optional, integer, 1),
-            max_env_steps=(optional, integer, 1),
-            evaluation=(instance, Trials, "Trials(...)"),
-            bins=(optional, checked_bins),
-            levels=(optional, integer, 2),
+            exploration=(checks.instance, ExplorationRule, rules),
+            max_steps=(checks.optional, checks.integer, 1),
+            max_env_steps=(checks.optional, checks.integer, 1),
+            evaluation=(checks.instance, Trials, "Trials(...)"),
+            bins=(checks.optional, checked_bins),
+            levels=(checks.optional, checks.integer, 2),
         )
         without = self.bins is None and self.levels is not None
-        require(not without, "levels", self.levels, "None where bins is None")
+        checks.require(not without, "levels", self.levels, "None where bins is None")
 
 
 def _checked_step_size(name: str, value: object) -> Any:
@@ -222,11 +212,11 @@ def q_learning(
     ((2, 112, 4), 200)
     """
     check_q_learning(env, config)
-    seeds = distinct_seeds(one_seed_of(env, seeds))
-    episodes = integer("episodes", episodes, 1)
-    at = integers("snapshots", snapshots, 0, episodes)
+    seeds = checks.distinct_seeds(one_seed_of(env, seeds))
+    episodes = checks.integer("episodes", episodes, 1)
+    at = checks.integers("snapshots", snapshots, 0, episodes)
     if progress is not None:
-        instance("progress", progress, Callable, "a function of episodes and steps, or None")
+        checks.instance("progress", progress, Callable, "a function of episodes and steps, or None")
     with _opened(env, config) as (_, model, shape):
         yardstick = make_yardstick(model, Q_star, shape)
     task, record = _task(config, episodes), empty_record(len(seeds), episodes)
@@ -256,7 +246,7 @@ def check_q_learning(env: object, config: object) -> None:
     --------
     >>> check_q_learning("MountainCar-v0", QLearningConfig(bins=10))
     """
-    instance("config", config, QLearningConfig, "a QLearningConfig")
+    checks.instance("config", config, QLearningConfig, "a QLearningConfig")
     with _opened(env, config):
         pass
 
@@ -333,11 +323,11 @@ def check_q_learning_on_model(env: object, config: object) -> None:
     --------
     >>> check_q_learning_on_model("rl_core/Maze-v0", QLearningConfig())
     """
-    instance("env", env, str, "an environment's id")
-    instance("config", config, QLearningConfig, "a QLearningConfig")
+    checks.instance("env", env, str, "an environment's id")
+    checks.instance("config", config, QLearningConfig, "a QLearningConfig")
     assert isinstance(env, str)
     assert isinstance(config, QLearningConfig)
-    require(config.gamma < 1, "gamma", config.gamma, "below 1, for planning")
+    checks.require(config.gamma < 1, "gamma", config.gamma, "below 1, for planning")
     check_q_learning(MDP.from_env(env), config)
 
 
@@ -345,7 +335,7 @@ def check_q_learning_on_model(env: object, config: object) -> None:
 def _opened(env: Any, config: Any) -> Iterator[tuple[DiscreteWorld, MDP | None, tuple[int, int]]]:
     """Open the world to act in; give it with its model, if it has one, and the shape of Q."""
     if isinstance(env, MDP):
-        require(config.bins is None, "bins", config.bins, "None where states are numbered")
+        checks.require(config.bins is None, "bins", config.bins, "None where states are numbered")
         yield tabular.model_arrays(env), env, (env.n_states, env.n_actions)
         return
     if config.bins is not None and (task := task_of(env)) is not None:
@@ -387,7 +377,7 @@ def make_yardstick(
     >>> int(yardstick.visitable.sum())
     92
     """
-    best = np.empty((0, shape[1])) if Q_star is None else floats("Q_star", Q_star, shape)
+    best = np.empty((0, shape[1])) if Q_star is None else checks.floats("Q_star", Q_star, shape)
     optimal = optimal_actions(best) if len(best) else best.astype(np.bool_)
     if model is None:
         nowhere = np.empty((0, 0, 0))
