@@ -341,23 +341,11 @@ def learn(learner: Learner, observations: F32, actions: F32, returns: F64, order
     for order in orders:
         for start in range(0, returns.size, largest):
             batch = order[start : start + largest]
-            likelihood_gradient(
-                policy,
-                parameters,
-                observations[batch],
-                actions[batch],
-                (returns[batch] / batch.size).astype(np.float32),
-                units,
-                deltas,
-                gradient,
-            )
+            examples = observations[batch], actions[batch]
+            weights = (returns[batch] / batch.size).astype(np.float32)
+            likelihood_gradient(policy, parameters, *examples, weights, units, deltas, gradient)
             gradient *= learner.trainable
             learner.updates[0] += 1
-            networks.adam_step(
-                parameters,
-                gradient,
-                learner.first,
-                learner.second,
-                learner.updates[0],
-                learner.learning_rate,
-            )
+            moments = learner.first, learner.second
+            count, rate = learner.updates[0], learner.learning_rate
+            networks.adam_step(parameters, gradient, *moments, count, rate)

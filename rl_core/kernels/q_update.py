@@ -298,19 +298,14 @@ def _update(learner: Learner, memory: Memory) -> bool:
     if not math.isfinite(loss_gradient(learner, memory)):
         return False
     counts, gradient, settings = learner.counts, learner.gradient, learner.settings
+    rate = settings.learning_rate
     gradient *= learner.trainable
     counts[UPDATES] += 1
     if settings.adam:
-        networks.adam_step(
-            learner.parameters,
-            gradient,
-            learner.first,
-            learner.second,
-            counts[UPDATES],
-            settings.learning_rate,
-        )
+        moments = learner.first, learner.second
+        networks.adam_step(learner.parameters, gradient, *moments, counts[UPDATES], rate)
     else:
-        networks.rmsprop_step(learner.parameters, gradient, learner.second, settings.learning_rate)
+        networks.rmsprop_step(learner.parameters, gradient, learner.second, rate)
     if counts[UPDATES] % settings.copy_every == 0:
         learner.fixed[:] = learner.parameters
         counts[COPIES] += 1
