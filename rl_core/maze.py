@@ -205,15 +205,8 @@ class Maze(OwnModel, gym.Env[int, int]):
             shape = (n_states, len(ACTIONS), 2)
             successor = np.empty(shape, dtype=np.int32)
             reward = np.zeros(shape)
-            _fill(
-                successor,
-                reward,
-                self._landing,
-                self._collects,
-                self._with_flag,
-                self._n_held,
-                self._is_goal,
-            )
+            moves = self._landing, self._collects, self._with_flag, self._n_held, self._is_goal
+            _fill(successor, reward, *moves)
             self._model = MDP(
                 successor=successor,
                 probability=np.broadcast_to(self._outcome_probabilities, shape),

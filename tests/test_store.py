@@ -72,7 +72,6 @@ def test_a_result_comes_back_as_it_was(store):
 
 def test_what_is_not_there(store):
     assert store.read(DIGEST) is None
-    assert store.provenances() == []
     with pytest.raises(KeyError, match=DIGEST):
         store.read_arrays(DIGEST)
 
@@ -197,14 +196,6 @@ def test_a_file_where_the_folder_should_be_is_replaced(store):
         store.read(DIGEST)
     write_example(store)
     assert store.read(DIGEST) is not None
-
-
-def test_damaged_records_are_left_out_of_the_provenances(store):
-    write_example(store, digest="aa")
-    write_example(store, digest="bb")
-    (store.path / "results" / "aa" / RECORD).write_text("{}")
-    (store.path / "results" / "cc").mkdir()
-    assert store.provenances() == [{"seed": 5, "config": {"gamma": 0.99}}]
 
 
 # --- interrupted writing --------------------------------------------------------------------------

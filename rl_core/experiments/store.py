@@ -151,17 +151,6 @@ class Store:
         with np.load(io.BytesIO(found[1][ARRAYS])) as arrays:
             return dict(arrays)
 
-    def provenances(self) -> list[dict[str, Any]]:
-        """Return the provenance of every result whose record is intact, tables not looked at."""
-        found = []
-        for folder in sorted((self.path / "results").glob("*")):
-            try:
-                record = _unsealed(folder / RECORD)
-            except (DamagedResultError, FileNotFoundError):
-                continue
-            found.append(record["provenance"])
-        return found
-
     def clean(self) -> None:
         """Remove what killed writers left behind."""
         sweep(self.path / "scratch", "*")

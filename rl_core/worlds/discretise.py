@@ -29,7 +29,13 @@ from numpy.typing import ArrayLike
 from rl_core.checks import floats, instance, integer, integers, require
 from rl_core.kernels.arrays import F32, F64, I64
 from rl_core.kernels.compiled import compiled
-from rl_core.worlds.environments import EnvironmentLike, checked_reward, opened
+from rl_core.worlds.environments import (
+    EnvironmentLike,
+    checked_reward,
+    native_action,
+    observed,
+    opened,
+)
 from rl_core.worlds.names import find
 from rl_core.worlds.tasks import Kernel, Task
 from rl_core.worlds.twins import twin
@@ -254,30 +260,25 @@ class Discretised(gymnasium.Wrapper[Any, Any, Any, Any]):
     def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
         """Take the action of this number; see `gymnasium.Env.step`."""
         self._steps += 1
-        taken: Any = self.levels[action]
-        if isinstance(self._native, spaces.Discrete):
-            taken = int(taken[0]) + int(self._native.start)
-        elif isinstance(self._native, spaces.Box):
-            taken = taken.astype(self._native.dtype).reshape(self._native.shape)
-        observation, reward, terminated, truncated, info = self.env.step(taken)
-        reward = checked_reward(f"{self.env}, at step {self._steps} of an episode", reward)
+        native = native_action(self._native, self.levels[action])
+        observation, reward, terminated, truncated, info = self.env.step(native)
+        reward = checked_reward(self._where(), reward)
         return self._cell(observation), reward, terminated, truncated, info
 
     def _cell(self, observation: Any) -> int:
-        """Number the cell; compiled code relies on the observation's size."""
+        """Number the cell."""
         space = self.env.observation_space
-        try:
-            seen = np.asarray(observation)
-        except ValueError:  # ragged nesting
-            seen = np.asarray(None)
-        fits = seen.shape == space.shape and seen.dtype.kind in "fiub"
-        if not fits or np.isnan(seen).any():
+        seen = observed(space, observation, self._where())
+        if np.isnan(seen).any():
             raise ValueError(
-                f"env must keep to its observation space {space}, from {self.env}, at step "
-                f"{self._steps} of an episode, came {observation!r}, which has no cell"
+                f"env must keep to its observation space {space}, from {self._where()}, came "
+                f"{observation!r}, which has no cell"
             )
         with np.errstate(over="ignore"):
             return int(cell(self.grid, seen.ravel().astype(np.float32)))
+
+    def _where(self) -> str:
+        return f"{self.env}, at step {self._steps} of an episode"
 
 
 class GriddedTask(NamedTuple):
