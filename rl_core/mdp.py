@@ -18,6 +18,7 @@ from rl_core import checks
 from rl_core.kernels.arrays import F64, I32, Bools
 from rl_core.kernels.bounds import SUM_TOLERANCE
 from rl_core.kernels.compiled import compiled
+from rl_core.kernels.model import Model
 from rl_core.worlds.tables import read_table, start_arrays
 
 STATES_AT_ONCE = 2**14  # bounds the memory of checking
@@ -151,6 +152,10 @@ class MDP:
             held = [n for n, stride in zip(array.shape, array.strides, strict=True) if stride]
             total += array.itemsize * int(np.prod(held))
         return total
+
+    def arrays(self) -> Model:
+        """Return the arrays as compiled code takes them."""
+        return Model(*(getattr(self, name) for name in Model._fields))
 
     def reachable_states(self) -> Bools:
         """Mark the states some policy can be in: those reached from the start states.

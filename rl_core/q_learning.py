@@ -58,6 +58,7 @@ from rl_core.kernels.appraisal import (
 from rl_core.kernels.arrays import F64, I64, Arrays
 from rl_core.kernels.choices import EPSILON_GREEDY, choose, step_size
 from rl_core.kernels.compiled import compiled
+from rl_core.kernels.model import NO_MODEL
 from rl_core.mdp import MDP
 from rl_core.planning import optimal_actions, value_iteration
 from rl_core.training import Failure, Progress, Run
@@ -336,7 +337,7 @@ def _opened(env: Any, config: Any) -> Iterator[tuple[DiscreteWorld, MDP | None, 
     """Open the world to act in; give it with its model, if it has one, and the shape of Q."""
     if isinstance(env, MDP):
         checks.require(config.bins is None, "bins", config.bins, "None where states are numbered")
-        yield tabular.model_arrays(env), env, (env.n_states, env.n_actions)
+        yield env.arrays(), env, (env.n_states, env.n_actions)
         return
     if config.bins is not None and (task := task_of(env)) is not None:
         grid = gridded(task, config.bins, levels=config.levels)
@@ -380,21 +381,9 @@ def make_yardstick(
     best = np.empty((0, shape[1])) if Q_star is None else checks.floats("Q_star", Q_star, shape)
     optimal = optimal_actions(best) if len(best) else best.astype(np.bool_)
     if model is None:
-        nowhere = np.empty((0, 0, 0))
-        return Yardstick(
-            best,
-            optimal,
-            np.empty(0, dtype=np.bool_),
-            *(nowhere.astype(np.int32), nowhere, nowhere, np.empty(0, dtype=np.bool_)),
-            *(np.empty(0, dtype=np.int32), np.empty(0)),
-        )
-    return Yardstick(
-        best,
-        optimal,
-        (model.reachable_states() & ~model.terminal)[: shape[0]],
-        *(model.successor, model.probability, model.reward, model.terminal),
-        *(model.start_state, model.start_probability),
-    )
+        return Yardstick(best, optimal, np.empty(0, dtype=np.bool_), NO_MODEL)
+    visitable = (model.reachable_states() & ~model.terminal)[: shape[0]]
+    return Yardstick(best, optimal, visitable, model.arrays())
 
 
 class _Task(NamedTuple):

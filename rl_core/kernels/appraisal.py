@@ -15,6 +15,7 @@ import pandas as pd
 
 from rl_core.kernels.arrays import F64, I32, I64, Bools
 from rl_core.kernels.compiled import compiled
+from rl_core.kernels.model import Model
 
 TOLERANCE = 1e-12
 """How far values may still move in a sweep when a policy counts as evaluated."""
@@ -50,19 +51,14 @@ class Yardstick(NamedTuple):
     visitable : ndarray of bool, shape (S,)
         States that are not terminal and can be reached from the start: those whose entries
         experience can ever change.
-    successor, probability, reward, terminal, start_state, start_probability
-        The model; see `rl_core.mdp.MDP`.
+    model : Model
+        The model.
     """
 
     Q_star: F64
     optimal: Bools
     visitable: Bools
-    successor: I32
-    probability: F64
-    reward: F64
-    terminal: Bools
-    start_state: I32
-    start_probability: F64
+    model: Model
 
 
 class Appraisal(NamedTuple):
@@ -103,7 +99,7 @@ def new_appraisal(yardstick: Yardstick) -> Appraisal:
     >>> new_appraisal(yardstick).found
     array([-1])
     """
-    n_states, n_actions = yardstick.successor.shape[:2]
+    n_states, n_actions = yardstick.model.successor.shape[:2]
     return Appraisal(
         np.zeros((n_states, n_actions), dtype=np.bool_),
         np.zeros(n_states, dtype=np.int32),
@@ -279,10 +275,10 @@ def value_lost(Q: F64, yardstick: Yardstick, gamma: float, appraisal: Appraisal)
     >>> round(value_lost(np.zeros((112, 4)), yardstick, 0.9, appraisal), 3)
     0.523
     """
-    if len(yardstick.start_state) == 0 or len(yardstick.Q_star) == 0:
+    if len(yardstick.model.start_state) == 0 or len(yardstick.Q_star) == 0:
         return math.nan
     if not _as_before(Q, appraisal):
-        _follow(Q, yardstick, appraisal)
+        _follow(Q, yardstick.model, appraisal)
         appraisal.lost[0] = _loss(yardstick, gamma, appraisal)
         if not math.isfinite(appraisal.lost[0]):
             appraisal.V[:] = 0.0
@@ -302,12 +298,12 @@ def _as_before(Q: F64, appraisal: Appraisal) -> bool:
 
 
 @compiled
-def _follow(Q: F64, yardstick: Yardstick, appraisal: Appraisal) -> None:
+def _follow(Q: F64, model: Model, appraisal: Appraisal) -> None:
     """Note which non-terminal states the greedy policy can get to, and what it does there."""
-    known = np.zeros(len(yardstick.terminal), dtype=np.bool_)
+    known = np.zeros(len(model.terminal), dtype=np.bool_)
     order, n_found, n_searched = appraisal.order, 0, 0
-    for s in yardstick.start_state:
-        if not yardstick.terminal[s]:
+    for s in model.start_state:
+        if not model.terminal[s]:
             known[s] = True
             order[n_found] = s
             n_found += 1
@@ -317,10 +313,10 @@ def _follow(Q: F64, yardstick: Yardstick, appraisal: Appraisal) -> None:
         best = np.max(Q[s])
         for a in range(Q.shape[1]):
             appraisal.greedy[s, a] = Q[s, a] == best
-            for k in range(yardstick.successor.shape[2] if Q[s, a] == best else 0):
-                s_next = yardstick.successor[s, a, k]
-                possible = yardstick.probability[s, a, k] > 0.0
-                if possible and not known[s_next] and not yardstick.terminal[s_next]:
+            for k in range(model.successor.shape[2] if Q[s, a] == best else 0):
+                s_next = model.successor[s, a, k]
+                possible = model.probability[s, a, k] > 0.0
+                if possible and not known[s_next] and not model.terminal[s_next]:
                     known[s_next] = True
                     order[n_found] = s_next
                     n_found += 1
@@ -330,31 +326,31 @@ def _follow(Q: F64, yardstick: Yardstick, appraisal: Appraisal) -> None:
 @compiled
 def _loss(yardstick: Yardstick, gamma: float, appraisal: Appraisal) -> float:
     """Value the policy by sweeps, in place, and compare it with the optimum; NaN: no values."""
-    order, V, start = appraisal.order, appraisal.V, yardstick.start_state
+    order, V, model = appraisal.order, appraisal.V, yardstick.model
     for _ in range(MAX_SWEEPS):
         change = 0.0
         for i in range(appraisal.found[0] - 1, -1, -1):  # what was found last is nearest to the end
             s = order[i]
-            v = _backup(V, appraisal.greedy, yardstick, gamma, s)
+            v = _backup(V, appraisal.greedy, model, gamma, s)
             change = max(change, abs(v - V[s]))
             V[s] = v
         if change <= TOLERANCE:
             lost = 0.0
-            for i in range(len(start)):
-                best = np.max(yardstick.Q_star[start[i]])
-                lost += yardstick.start_probability[i] * (best - V[start[i]])
+            for i in range(len(model.start_state)):
+                s = model.start_state[i]
+                lost += model.start_probability[i] * (np.max(yardstick.Q_star[s]) - V[s])
             return lost
     return math.nan
 
 
 @compiled
-def _backup(V: F64, greedy: Bools, yardstick: Yardstick, gamma: float, s: int) -> float:
+def _backup(V: F64, greedy: Bools, model: Model, gamma: float, s: int) -> float:
     """Return sum_a pi(a | s) sum_k p_k (r_k + gamma V(s'_k)) for the greedy policy pi."""
     total, ties = 0.0, 0
     for a in range(greedy.shape[1]):
         if greedy[s, a]:
             ties += 1
-            for k in range(yardstick.successor.shape[2]):
-                after = yardstick.reward[s, a, k] + gamma * V[yardstick.successor[s, a, k]]
-                total += yardstick.probability[s, a, k] * after
+            for k in range(model.successor.shape[2]):
+                after = model.reward[s, a, k] + gamma * V[model.successor[s, a, k]]
+                total += model.probability[s, a, k] * after
     return total / ties
