@@ -32,29 +32,10 @@ import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import ArrayLike
 
-from rl_core import checks
-from rl_core.exploration import (
-    EpsilonGreedy,
-    ExplorationRule,
-    Schedule,
-    Trials,
-    VisitDecay,
-    check_step_size,
-    values,
-)
-from rl_core.kernels.appraisal import (
-    RETURN,
-    Appraisal,
-    Yardstick,
-    as_table,
-    empty_record,
-    env_steps,
-    new_appraisal,
-    steps_so_far,
-    write_episode,
-    write_evaluation,
-    write_loss,
-)
+from rl_core import checks, exploration
+from rl_core.exploration import EpsilonGreedy, ExplorationRule, Schedule, Trials, VisitDecay
+from rl_core.kernels import appraisal
+from rl_core.kernels.appraisal import Appraisal, Yardstick
 from rl_core.kernels.arrays import F64, I64, Arrays
 from rl_core.kernels.choices import EPSILON_GREEDY, choose, step_size
 from rl_core.kernels.compiled import compiled
@@ -134,7 +115,7 @@ class QLearningConfig:
 
 
 def _checked_step_size(name: str, value: object) -> Any:
-    return value if isinstance(value, VisitDecay) else check_step_size(name, value)
+    return value if isinstance(value, VisitDecay) else exploration.check_step_size(name, value)
 
 
 def q_learning(
@@ -220,7 +201,7 @@ def q_learning(
         checks.instance("progress", progress, Callable, "a function of episodes and steps, or None")
     with _opened(env, config) as (_, model, shape):
         yardstick = make_yardstick(model, Q_star, shape)
-    task, record = _task(config, episodes), empty_record(len(seeds), episodes)
+    task, record = _task(config, episodes), appraisal.empty_record(len(seeds), episodes)
     arrays, failures = _empty_arrays(len(seeds), len(at), shape), []
     for i, seed in enumerate(seeds):
         own = {name: array[i] for name, array in arrays.items()}
@@ -228,8 +209,8 @@ def q_learning(
             failure = _train(world, task, yardstick, seed, at, own, record[i])
         failures += [] if failure is None else [failure]
         if progress is not None:
-            progress((i + 1) * episodes, env_steps(record))
-    return Run(as_table(record, seeds), arrays, tuple(failures))
+            progress((i + 1) * episodes, appraisal.env_steps(record))
+    return Run(appraisal.as_table(record, seeds), arrays, tuple(failures))
 
 
 def check_q_learning(env: object, config: object) -> None:
@@ -409,8 +390,8 @@ def _task(config: QLearningConfig, episodes: int) -> _Task:
         initial, exponent = config.step_size, 0.0
     return _Task(
         rule=config.exploration.kind,
-        parameter=values(config.exploration.parameter, episodes),
-        step_size=values(initial, episodes),
+        parameter=exploration.values(config.exploration.parameter, episodes),
+        step_size=exploration.values(initial, episodes),
         exponent=exponent,
         gamma=config.gamma,
         max_steps=config.max_steps or NO_LIMIT,
@@ -426,7 +407,7 @@ def _learn(
     world: DiscreteWorld,
     task: _Task,
     yardstick: Yardstick,
-    appraisal: Appraisal,
+    known: Appraisal,
     draws: Draws,
     trial_draws: Draws,
     Q: F64,
@@ -441,22 +422,22 @@ def _learn(
     its number instead.
     """
     for k in range(first, last):
-        left = task.max_env_steps - steps_so_far(record, k)
+        left = task.max_env_steps - appraisal.steps_so_far(record, k)
         if left <= 0:
             return k - 1
         max_steps = min(task.max_steps, left)
         outcome = _learn_episode(world, task, draws, Q, visits, k, max_steps)
-        write_episode(record, k, outcome, Q, yardstick)
+        appraisal.write_episode(record, k, outcome, Q, yardstick)
         if not np.isfinite(outcome[1]):
             return k
         on_trial = (k + 1) % task.trial_every == 0
         if on_trial or task.gamma < 1.0:
-            write_loss(record, k, Q, yardstick, task.gamma, appraisal)
+            appraisal.write_loss(record, k, Q, yardstick, task.gamma, known)
         if on_trial:
             trials = np.empty((task.trial_episodes, 2))
             for i in range(task.trial_episodes):
                 trials[i] = _try_episode(world, task, trial_draws, Q)
-            write_evaluation(record, k, trials)
+            appraisal.write_evaluation(record, k, trials)
     return last
 
 
@@ -533,7 +514,7 @@ def _train(
 ) -> Failure | None:
     """Run one seed, pausing at the snapshots; return why it failed, if it did."""
     learn = _learn if isinstance(world, Played) else _learn_compiled
-    draws, appraisal = tabular.spawn_draws(seed, 2), new_appraisal(yardstick)
+    draws, known = tabular.spawn_draws(seed, 2), appraisal.new_appraisal(yardstick)
     if isinstance(world, Played):
         world.env.reset(seed=seed)  # for what else the environment draws from
     if isinstance(world, GriddedTask) and world.max_steps > 0:
@@ -544,13 +525,13 @@ def _train(
     for last in sorted({*snapshots, episodes}):
         Q, visits = arrays["Q"], arrays["visits"]
         stopped = learn(
-            world, task, yardstick, appraisal, draws[0], draws[1], Q, visits, record, first, last
+            world, task, yardstick, known, draws[0], draws[1], Q, visits, record, first, last
         )
         ended = stopped < last  # then later snapshots are of the last table
         for j in [j for j, at in enumerate(snapshots) if at == last or (ended and at > last)]:
             arrays["Q_snapshots"][j], arrays["visits_snapshots"][j] = arrays["Q"], arrays["visits"]
         if ended:
-            bad = not np.isfinite(record[stopped, RETURN])
+            bad = not np.isfinite(record[stopped, appraisal.RETURN])
             return Failure(seed, stopped + 1, "the return is not finite") if bad else None
         first = last
     return None

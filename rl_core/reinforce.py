@@ -31,22 +31,13 @@ from typing import Literal, NamedTuple
 import numpy as np
 import torch
 
-from rl_core import modules
+from rl_core import modules, policies
 from rl_core.checks import fields, instance, integer, number, one_of, optional, positive, truth
 from rl_core.kernels import likelihood
 from rl_core.kernels.arrays import F32, F64, I64, Arrays
 from rl_core.kernels.compiled import compiled
 from rl_core.kernels.likelihood import Actor, Policy
-from rl_core.policies import (
-    MLP,
-    Categorical,
-    Gaussian,
-    Network,
-    check_network,
-    initial_parameters,
-    make_policy,
-    trainable,
-)
+from rl_core.policies import MLP, Categorical, Gaussian, Network
 from rl_core.training import Progress, Run, Training, spawn_streams, train_seeds
 from rl_core.worlds.environments import EnvironmentLike, World, one_seed_of, open_world
 from rl_core.worlds.episodes import ModuleActor, Trajectory, play_episode, with_constant
@@ -119,7 +110,7 @@ class ReinforceConfig:
             max_env_steps=(optional, integer, 1),
             learn_from_capped=(truth,),
         )
-        object.__setattr__(self, "engine", check_network(self.network, self.engine))
+        object.__setattr__(self, "engine", policies.check_network(self.network, self.engine))
 
 
 @compiled
@@ -241,7 +232,7 @@ def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator)
     """Draw the initial weights and set up the engine that learns them."""
     hidden = config.network.hidden if isinstance(config.network, MLP) else ()
     spaces = world.n_observations, world.n_actions, world.action_dimensions
-    policy = make_policy(config.policy, hidden, *spaces)
+    policy = policies.make_policy(config.policy, hidden, *spaces)
     n_sigmas = policy.action_width if policy.gaussian else 0
     if not isinstance(config.network, MLP):
         n_inputs, n_outputs = policy.sizes.tolist()
@@ -256,7 +247,7 @@ def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator)
 
         return _Agent(ModuleActor(policy, module, log_sigma), learner.learn, by_name)
     biases = config.network.biases
-    parameters = initial_parameters(policy, config.policy, rng)
+    parameters = policies.initial_parameters(policy, config.policy, rng)
 
     def layers() -> Arrays:
         named = likelihood.unpack(policy, parameters)
@@ -269,7 +260,7 @@ def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator)
         log_sigma = _log_sigma(config, vector[len(vector) - n_sigmas :])
         learn = TorchLearner(policy, module, log_sigma, config).learn
     else:
-        learns = trainable(policy, config.policy, biases)
+        learns = policies.trainable(policy, config.policy, biases)
         rates = config.batch_size, config.learning_rate
         learn = partial(
             likelihood.learn, likelihood.make_learner(policy, parameters, learns, *rates)
