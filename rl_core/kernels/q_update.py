@@ -22,11 +22,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
 
 from rl_core.kernels import choices, networks
 from rl_core.kernels.arrays import F32, F64, I64
-from rl_core.kernels.compiled import compiled
+from rl_core.kernels.compiled import compiled, compiled_as
 from rl_core.kernels.replay import Memory
 
 STEPS, UPDATES, COPIES, KEPT, ACTION = range(5)
@@ -313,8 +312,5 @@ def _update(learner: Learner, memory: Memory) -> bool:
     return True
 
 
-# What the two mean in compiled code.
-overload(q_values)(
-    lambda learner, observation: lambda learner, observation: _q_values(learner, observation)
-)
-overload(update)(lambda learner, memory: lambda learner, memory: _update(learner, memory))
+compiled_as(q_values, _q_values)
+compiled_as(update, _update)

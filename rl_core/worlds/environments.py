@@ -17,11 +17,10 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
-from numba.extending import overload
 from numpy.typing import NDArray
 
 from rl_core.kernels.arrays import F32
-from rl_core.kernels.compiled import compiled
+from rl_core.kernels.compiled import compiled, compiled_as
 from rl_core.worlds.names import Make, find, make_environment
 from rl_core.worlds.tasks import Kernel, Task
 from rl_core.worlds.twins import twin
@@ -228,12 +227,7 @@ def _step_task(kernel: Kernel, action: F32, following: F32) -> tuple[float, bool
     return reward, terminated, False
 
 
-# What it means in compiled code.
-overload(step)(
-    lambda stepper, action, following: (
-        lambda stepper, action, following: _step_task(stepper, action, following)
-    )
-)
+compiled_as(step, _step_task)
 
 
 def open_world(env: EnvironmentLike) -> World:

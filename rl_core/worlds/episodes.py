@@ -11,11 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from numba.extending import overload
 
 from rl_core.kernels import likelihood
 from rl_core.kernels.arrays import F32, F64
-from rl_core.kernels.compiled import compiled
+from rl_core.kernels.compiled import compiled, compiled_as
 from rl_core.kernels.likelihood import Actor, Policy
 from rl_core.worlds.environments import TaskWorld, World, step
 
@@ -57,14 +56,7 @@ def act(actor: Actor | ModuleActor, observation: F32, noise: F64, action: F32) -
     likelihood.draw_action(actor.policy, actor.log_sigma.detach().numpy(), units, noise, action)
 
 
-# What it means in compiled code.
-overload(act)(
-    lambda actor, observation, noise, action: (
-        lambda actor, observation, noise, action: likelihood.choose_action(
-            actor, observation, noise, action
-        )
-    )
-)
+compiled_as(act, likelihood.choose_action)
 
 
 class Trajectory:
