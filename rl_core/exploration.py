@@ -16,9 +16,9 @@ from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rl_core.checks import fields, instance, integer, number, optional, positive, require
+from rl_core.kernels.arrays import F64
 from rl_core.kernels.choices import EPSILON_GREEDY, SOFTMAX, UNNORMALISED_SOFTMAX
 
 
@@ -60,7 +60,7 @@ class Linear:
         given = (self.episodes, self.steps)
         require(given.count(None) == 1, "episodes, steps", given, "one of them a number, one None")
 
-    def values(self, episodes: int) -> NDArray[np.float64]:
+    def values(self, episodes: int) -> F64:
         """Return the values of the first `episodes` episodes, float64 of shape (episodes,)."""
         duration = _by_the_episode(self)
         share = np.minimum(1.0, np.arange(episodes) / duration)
@@ -98,7 +98,7 @@ class Geometric:
     def __post_init__(self) -> None:
         fields(self, start=(positive,), end=(positive,), episodes=(integer, 1))
 
-    def values(self, episodes: int) -> NDArray[np.float64]:
+    def values(self, episodes: int) -> F64:
         """Return the values of the first `episodes` episodes, float64 of shape (episodes,)."""
         share = np.minimum(1.0, np.arange(episodes) / self.episodes)
         return _between(self, self.episodes, self.start * (self.end / self.start) ** share)
@@ -147,7 +147,7 @@ Epsilon = float | Linear | HalfWay
 """Epsilon of a deep Q-network: constant, by the environment step, or by events."""
 
 
-def schedule_state(epsilon: Epsilon) -> NDArray[np.float64]:
+def schedule_state(epsilon: Epsilon) -> F64:
     """Return the state in which a schedule of epsilon begins; see `rl_core.kernels.choices`.
 
     Returns
@@ -368,7 +368,7 @@ class Trials:
         fields(self, epsilon=(number, 0, 1), **counts)
 
 
-def values(parameter: float | Schedule, episodes: int) -> NDArray[np.float64]:
+def values(parameter: float | Schedule, episodes: int) -> F64:
     """Return a parameter's value in each of the first `episodes` episodes.
 
     Examples
@@ -413,7 +413,7 @@ def _by_the_episode(schedule: Linear) -> int:
     return duration
 
 
-def _between(schedule: Schedule, episodes: int, course: NDArray[np.float64]) -> NDArray[np.float64]:
+def _between(schedule: Schedule, episodes: int, course: F64) -> F64:
     """Return the course without what rounding adds: in range, and at its end from then on."""
     course[episodes:] = schedule.end
     low, high = sorted((schedule.start, schedule.end))

@@ -17,6 +17,7 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from rl_core import checks
+from rl_core.kernels.arrays import F64, I32, Bools
 from rl_core.kernels.compiled import compiled
 from rl_core.mdp import MDP, OwnModel
 from rl_core.worlds.maze_layout import COURSE_LAYOUT, MAX_FLAGS, find, random_layout, read_layout
@@ -112,8 +113,8 @@ class Maze(OwnModel, gym.Env[int, int]):
         self.layout = "".join(f"{row}\n" for row in _joined(letters))
         self.slip = checks.number("slip", slip, 0, 1)
         self.render_mode = render_mode
-        self.walls: NDArray[np.bool_] = letters == "W"
-        self.cells: NDArray[np.int32] = np.argwhere(~self.walls.T)[:, ::-1].astype(np.int32)
+        self.walls: Bools = letters == "W"
+        self.cells: I32 = np.argwhere(~self.walls.T)[:, ::-1].astype(np.int32)
         self.start = find(letters, "S")[0]
         self.goals = tuple(find(letters, "G"))
         self.flag_cells = dict(zip("ABCDEFGHIJKLMNOP", find(letters, "F"), strict=False))
@@ -204,15 +205,8 @@ class Maze(OwnModel, gym.Env[int, int]):
             shape = (n_states, len(ACTIONS), 2)
             successor = np.empty(shape, dtype=np.int32)
             reward = np.zeros(shape)
-            _fill(
-                successor,
-                reward,
-                self._landing,
-                self._collects,
-                self._with_flag,
-                self._n_held,
-                self._is_goal,
-            )
+            moves = self._landing, self._collects, self._with_flag, self._n_held, self._is_goal
+            _fill(successor, reward, *moves)
             self._model = MDP(
                 successor=successor,
                 probability=np.broadcast_to(self._outcome_probabilities, shape),
@@ -223,7 +217,7 @@ class Maze(OwnModel, gym.Env[int, int]):
             )
         return self._model
 
-    def reachable_states(self) -> NDArray[np.bool_]:
+    def reachable_states(self) -> Bools:
         """Mark the states an episode can be in, as bool of shape (S,).
 
         The others have the agent on a flag's cell without that flag, or in a walled-off part.
@@ -438,13 +432,13 @@ def _joined(letters: NDArray[np.str_]) -> list[str]:
 
 @compiled
 def _fill(
-    successor: NDArray[np.int32],
-    reward: NDArray[np.float64],
-    landing: NDArray[np.int32],
+    successor: I32,
+    reward: F64,
+    landing: I32,
     collects: NDArray[np.int8],
-    with_flag: NDArray[np.int32],
+    with_flag: I32,
     n_held: NDArray[np.uint8],
-    is_goal: NDArray[np.bool_],
+    is_goal: Bools,
 ) -> None:
     """Write successors and rewards; `reward` comes in as zeros."""
     n_sets = len(n_held)

@@ -15,9 +15,13 @@ from gymnasium import wrappers
 from numpy.typing import ArrayLike, NDArray
 
 from rl_core import checks
+from rl_core.kernels.arrays import F64, I32, Bools
 from rl_core.kernels.bounds import SUM_TOLERANCE
 from rl_core.kernels.compiled import compiled
+from rl_core.kernels.model import Model
 from rl_core.worlds.tables import read_table, start_arrays
+
+STATES_AT_ONCE = 2**14  # bounds the memory of checking
 
 TRANSPARENT = (
     wrappers.Autoreset,
@@ -102,12 +106,12 @@ class MDP:
     (2, 1, 2)
     """
 
-    successor: NDArray[np.int32]
-    probability: NDArray[np.float64]
-    reward: NDArray[np.float64]
-    terminal: NDArray[np.bool_]
-    start_state: NDArray[np.int32]
-    start_probability: NDArray[np.float64]
+    successor: I32
+    probability: F64
+    reward: F64
+    terminal: Bools
+    start_state: I32
+    start_probability: F64
 
     def __post_init__(self) -> None:
         for name, dtype, ndim in (
@@ -120,7 +124,8 @@ class MDP:
         ):
             object.__setattr__(self, name, _as_array(name, getattr(self, name), dtype, ndim))
         self._check_shapes()
-        self._check_transitions()
+        for first in range(0, self.n_states, STATES_AT_ONCE):
+            self._check_transitions(first)
         self._check_start()
 
     @property
@@ -148,7 +153,11 @@ class MDP:
             total += array.itemsize * int(np.prod(held))
         return total
 
-    def reachable_states(self) -> NDArray[np.bool_]:
+    def arrays(self) -> Model:
+        """Return the arrays as compiled code takes them."""
+        return Model(*(getattr(self, name) for name in Model._fields))
+
+    def reachable_states(self) -> Bools:
         """Mark the states some policy can be in: those reached from the start states.
 
         Returns
@@ -261,35 +270,34 @@ class MDP:
             "of the same length, at least 1",
         )
 
-    def _check_transitions(self) -> None:
-        """Raise on the first state, action and slot that breaks a rule."""
-        fault, s, a, k = _first_fault(
-            self.successor, self.probability, self.reward, self.terminal, SUM_TOLERANCE
-        )
-        if fault == _SOUND:
-            return
-        if fault == _BAD_SUM:
-            total = self.probability[s, a].sum()
-            raise ValueError(
-                f"probability must sum to 1, at state {s}, action {a} the sum is {total}"
-            )
-        name, allowed = {
-            _BAD_PROBABILITY: ("probability", "must be from 0 to 1"),
-            _BAD_SUCCESSOR: ("successor", f"must be from 0 to {self.n_states - 1}"),
-            _BAD_REWARD: ("reward", "must be finite"),
-            _LEAVES_TERMINAL: ("successor", "of a terminal state must be the state itself"),
-            _PAYS_IN_TERMINAL: ("reward", "of a terminal state must be 0"),
-        }[fault]
-        value = getattr(self, name)[s, a, k]
-        raise ValueError(f"{name} {allowed}, at state {s}, action {a}, slot {k} it is {value}")
+    def _check_transitions(self, first: int) -> None:
+        """Check some states, from `first` on."""
+        some = slice(first, first + STATES_AT_ONCE)
+        successor, probability = self.successor[some], self.probability[some]
+        reward, ends = self.reward[some], self.terminal[some, None, None]
+        stays = successor == np.arange(first, first + len(successor))[:, None, None]
+        last = self.n_states - 1
+        for name, right, allowed in (
+            ("probability", _within(probability, 1), "must be from 0 to 1"),
+            ("successor", _within(successor, last), f"must be from 0 to {last}"),
+            ("reward", np.isfinite(reward), "must be finite"),
+            ("successor", stays | ~ends, "of a terminal state must be the state itself"),
+            ("reward", (reward == 0) | ~ends, "of a terminal state must be 0"),
+        ):
+            for s, a, k in np.argwhere(~right)[:1]:
+                value = getattr(self, name)[some][s, a, k]
+                found = f"at state {first + s}, action {a}, slot {k} it is {value}"
+                raise ValueError(f"{name} {allowed}, {found}")
+        total = probability.sum(axis=2)
+        for s, a in np.argwhere(np.abs(total - 1) > SUM_TOLERANCE)[:1]:
+            found = f"at state {first + s}, action {a} the sum is {total[s, a]}"
+            raise ValueError(f"probability must sum to 1, {found}")
 
     def _check_start(self) -> None:
         for name, most in (("start_state", self.n_states - 1), ("start_probability", 1)):
             values = getattr(self, name)
-            wrong = np.flatnonzero(~((values >= 0) & (values <= most)))  # catches NaN too
-            if len(wrong):
-                found = f"entry {wrong[0]} is {values[wrong[0]]}"
-                raise ValueError(f"{name} must be from 0 to {most}, {found}")
+            for i in np.flatnonzero(~_within(values, most))[:1]:
+                raise ValueError(f"{name} must be from 0 to {most}, entry {i} is {values[i]}")
         total = float(self.start_probability.sum())
         if abs(total - 1) > SUM_TOLERANCE:
             raise ValueError(f"start_probability must sum to 1, the sum is {total}")
@@ -354,52 +362,14 @@ def _as_array(name: str, values: ArrayLike, dtype: type[np.generic], ndim: int) 
     return view
 
 
-(
-    _SOUND,
-    _BAD_PROBABILITY,
-    _BAD_SUM,
-    _BAD_SUCCESSOR,
-    _BAD_REWARD,
-    _LEAVES_TERMINAL,
-    _PAYS_IN_TERMINAL,
-) = range(7)
+def _within(values: NDArray[Any], most: int) -> Bools:
+    """Mark what lies from 0 to `most`, which NaN does not."""
+    within: Bools = (values >= 0) & (values <= most)
+    return within
 
 
 @compiled
-def _first_fault(
-    successor: NDArray[np.int32],
-    probability: NDArray[np.float64],
-    reward: NDArray[np.float64],
-    terminal: NDArray[np.bool_],
-    tolerance: float,
-) -> tuple[int, int, int, int]:
-    """Return the first broken rule with its state, action and slot, or `_SOUND`."""
-    n_states, n_actions, n_successors = successor.shape
-    for s in range(n_states):
-        for a in range(n_actions):
-            total = 0.0
-            for k in range(n_successors):
-                p = probability[s, a, k]
-                if not (0.0 <= p <= 1.0):  # catches NaN too
-                    return _BAD_PROBABILITY, s, a, k
-                if not (0 <= successor[s, a, k] < n_states):
-                    return _BAD_SUCCESSOR, s, a, k
-                if not np.isfinite(reward[s, a, k]):
-                    return _BAD_REWARD, s, a, k
-                if terminal[s] and successor[s, a, k] != s:
-                    return _LEAVES_TERMINAL, s, a, k
-                if terminal[s] and reward[s, a, k] != 0.0:
-                    return _PAYS_IN_TERMINAL, s, a, k
-                total += p
-            if abs(total - 1.0) > tolerance:
-                return _BAD_SUM, s, a, 0
-    return _SOUND, 0, 0, 0
-
-
-@compiled
-def _reachable(
-    successor: NDArray[np.int32], probability: NDArray[np.float64], start: NDArray[np.int32]
-) -> NDArray[np.bool_]:
+def _reachable(successor: I32, probability: F64, start: I32) -> Bools:
     """Mark what a depth-first search from `start` finds."""
     n_states, n_actions, n_successors = successor.shape
     reached = np.zeros(n_states, dtype=np.bool_)

@@ -17,12 +17,11 @@ from numpy.typing import NDArray
 
 from rl_core.identity import imported
 from rl_core.kernels import networks
+from rl_core.kernels.arrays import F32, Arrays
 from rl_core.policies import MLP, Network
 
 
-def perceptron(
-    sizes: Sequence[int], parameters: NDArray[np.float32], biases: bool = True
-) -> torch.nn.Sequential:
+def perceptron(sizes: Sequence[int], parameters: F32, biases: bool = True) -> torch.nn.Sequential:
     """Build a perceptron over a parameter vector, whose memory it shares.
 
     Linear layers alternate with rectified linear units.
@@ -150,7 +149,7 @@ def reproducible(seed: int = 0) -> Iterator[None]:
         torch.set_deterministic_debug_mode(mode)
 
 
-def as_arrays(module: torch.nn.Module) -> dict[str, NDArray[Any]]:
+def as_arrays(module: torch.nn.Module) -> Arrays:
     """Return a module's parameters and buffers by name, as copies.
 
     Examples
@@ -179,7 +178,26 @@ def load_arrays(module: torch.nn.Module, arrays: Mapping[str, NDArray[Any]]) -> 
         raise ValueError(f"weights must be those of the network: {error}") from error
 
 
-class Adam(torch.optim.Optimizer):
+class _Optimiser(torch.optim.Optimizer):
+    """The loop over the parameters; the rule for one of them is `descend`."""
+
+    def __init__(self, parameters: Any, lr: float) -> None:
+        super().__init__(parameters, {"lr": lr})
+
+    @torch.no_grad()
+    def step(self, closure: None = None) -> None:  # type: ignore[override]
+        """Descend in all parameters that have a gradient."""
+        for group in self.param_groups:
+            for theta in group["params"]:
+                if theta.grad is not None:
+                    self.descend(theta, theta.grad, group["lr"], self.state[theta])
+
+    def descend(self, theta: Any, gradient: Any, alpha: float, state: dict[str, Any]) -> None:
+        """Change a parameter in place."""
+        raise NotImplementedError
+
+
+class Adam(_Optimiser):
     """Adam with epsilon where TensorFlow 1 has it; see `rl_core.kernels.networks.adam_step`.
 
     Examples
@@ -191,25 +209,17 @@ class Adam(torch.optim.Optimizer):
     0.9
     """
 
-    def __init__(self, parameters: Any, lr: float) -> None:
-        super().__init__(parameters, {"lr": lr})
-
-    @torch.no_grad()
-    def step(self, closure: None = None) -> None:  # type: ignore[override]
+    def descend(self, theta: Any, gradient: Any, alpha: float, state: dict[str, Any]) -> None:
         """Descend: theta <- theta - alpha_t m / (sqrt(v) + 1e-8)."""
-        for theta, alpha, state in _with_gradient(self):
-            m, v, t = (
-                *(state.setdefault(key, torch.zeros_like(theta)) for key in "mv"),
-                state.get("t", 0) + 1,
-            )
-            state["t"] = t
-            m.mul_(0.9).add_(theta.grad, alpha=0.1)
-            v.mul_(0.999).addcmul_(theta.grad, theta.grad, value=0.001)
-            alpha_t = alpha * math.sqrt(1 - 0.999**t) / (1 - 0.9**t)
-            theta.sub_(alpha_t * m / (v.sqrt() + 1e-8))
+        m, v = (state.setdefault(key, torch.zeros_like(theta)) for key in "mv")
+        t = state["t"] = state.get("t", 0) + 1
+        m.mul_(0.9).add_(gradient, alpha=0.1)
+        v.mul_(0.999).addcmul_(gradient, gradient, value=0.001)
+        alpha_t = alpha * math.sqrt(1 - 0.999**t) / (1 - 0.9**t)
+        theta.sub_(alpha_t * m / (v.sqrt() + 1e-8))
 
 
-class RMSProp(torch.optim.Optimizer):
+class RMSProp(_Optimiser):
     """RMSProp with TensorFlow 1's constants; see `rl_core.kernels.networks.rmsprop_step`.
 
     Examples
@@ -221,20 +231,8 @@ class RMSProp(torch.optim.Optimizer):
     0.9
     """
 
-    def __init__(self, parameters: Any, lr: float) -> None:
-        super().__init__(parameters, {"lr": lr})
-
-    @torch.no_grad()
-    def step(self, closure: None = None) -> None:  # type: ignore[override]
+    def descend(self, theta: Any, gradient: Any, alpha: float, state: dict[str, Any]) -> None:
         """Descend: theta <- theta - alpha g / sqrt(v + 1e-10), where v begins at 1."""
-        for theta, alpha, state in _with_gradient(self):
-            v = state.setdefault("v", torch.ones_like(theta))
-            v.mul_(0.9).addcmul_(theta.grad, theta.grad, value=0.1)
-            theta.sub_(alpha * theta.grad / (v + 1e-10).sqrt())
-
-
-def _with_gradient(optimiser: torch.optim.Optimizer) -> Iterator[tuple[Any, float, dict[str, Any]]]:
-    for group in optimiser.param_groups:
-        for theta in group["params"]:
-            if theta.grad is not None:
-                yield theta, group["lr"], optimiser.state[theta]
+        v = state.setdefault("v", torch.ones_like(theta))
+        v.mul_(0.9).addcmul_(gradient, gradient, value=0.1)
+        theta.sub_(alpha * gradient / (v + 1e-10).sqrt())

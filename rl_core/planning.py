@@ -25,13 +25,14 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import csr_matrix, identity
 from scipy.sparse.linalg import splu
 from tqdm import tqdm
 
 from rl_core import checks
 from rl_core.kernels import bounds, sweeps
+from rl_core.kernels.arrays import F64, Bools, Ints
 from rl_core.kernels.bounds import error_bound, rounding_error, sweeps_allowed
 from rl_core.kernels.sweeps import TIE, Transitions
 from rl_core.mdp import MDP, checked_policy
@@ -77,9 +78,9 @@ class Plan:
         - `bound`: no entry of Q or V is further than this from Q* or V* (NaN: not known).
     """
 
-    Q: NDArray[np.float64]
-    V: NDArray[np.float64]
-    policy: NDArray[np.signedinteger]
+    Q: F64
+    V: F64
+    policy: Ints
     table: pd.DataFrame
 
 
@@ -132,7 +133,7 @@ def q_value_iteration(
     [0.733, 0.863, 0.821, 0.781]
     """
     gamma, transitions, reward = _opened(mdp, gamma)
-    threshold = checks.number("threshold", threshold, above=0)
+    threshold = checks.positive("threshold", threshold)
     limit = checks.optional("max_sweeps", max_sweeps, checks.integer, 1) or math.inf
     Q, V, policy = _blank(mdp)
     largest, norm = _largest(reward, gamma), math.inf
@@ -216,16 +217,15 @@ def value_iteration(
     (np.float64(0.542026), True)
     """
     gamma, transitions, reward = _opened(mdp, gamma)
-    tolerance = checks.number("tolerance", tolerance, above=0)
+    tolerance = checks.positive("tolerance", tolerance)
     Q, V, policy = _blank(mdp)
-    order = np.arange(mdp.n_states, dtype=np.int32)
-    magnitude = sweeps.expected_rewards(transitions, reward, order, Q)  # Q is r(s, a) for now
+    magnitude = sweeps.expected_rewards(transitions, reward, Q)  # Q is r(s, a) for now
     bounds.check_returns("mdp", magnitude, gamma)
     bound = error_bound(magnitude, gamma, rounding_error(mdp.n_successors, magnitude))
     with _recording("value iteration", progress) as record:
         if bound > tolerance:  # else V = 0 will do
+            order = np.empty(mdp.n_states, dtype=np.int32)
             ordered = sweeps.in_order(transitions, Q, mdp.terminal, gamma, order, V)
-            sweeps.expected_rewards(transitions, reward, order, Q)
             bound = _sweep(mdp, ordered, Q, gamma, tolerance, V, policy, magnitude, record)
             del ordered
             V[order], policy[order] = V.copy(), policy.copy()
@@ -241,11 +241,11 @@ def value_iteration(
 def _sweep(
     mdp: MDP,
     ordered: Transitions,
-    r: NDArray[np.float64],
+    r: F64,
     gamma: float,
     tolerance: float,
-    V: NDArray[np.float64],
-    policy: NDArray[np.signedinteger],
+    V: F64,
+    policy: Ints,
     magnitude: float,
     record: _Record,
 ) -> float:
@@ -336,7 +336,7 @@ def policy_iteration(
     (np.float64(0.542026), 0)
     """
     gamma, transitions, reward = _opened(mdp, gamma)
-    threshold = checks.optional("evaluation_threshold", evaluation_threshold, _above_zero)
+    threshold = checks.optional("evaluation_threshold", evaluation_threshold, checks.positive)
     largest = _largest(reward, gamma)
     Q, V, policy = _blank(mdp)
     first = 0  # backups before the first round
@@ -369,7 +369,7 @@ def policy_iteration(
     return Plan(Q, V, policy, record.table("evaluation_sweeps"))
 
 
-def policy_evaluation(mdp: MDP, policy: ArrayLike, *, gamma: float) -> NDArray[np.float64]:
+def policy_evaluation(mdp: MDP, policy: ArrayLike, *, gamma: float) -> F64:
     """Return the values of a deterministic policy, the solution of V = r_π + γ P_π V.
 
     Up to 20,000 states the equations are solved directly (sparse LU factors). In larger models
@@ -415,12 +415,12 @@ def policy_evaluation(mdp: MDP, policy: ArrayLike, *, gamma: float) -> NDArray[n
         (followed.probability.ravel(), followed.successor.ravel(), row_starts), shape=(S, S)
     )
     r = (followed.probability * followed.reward).sum(axis=(1, 2))
-    V: NDArray[np.float64] = splu((identity(S) - gamma * P).tocsc()).solve(r)
+    V: F64 = splu((identity(S) - gamma * P).tocsc()).solve(r)
     V[mdp.terminal] = 0  # exactly
     return V
 
 
-def backup(mdp: MDP, V: ArrayLike, *, gamma: float) -> NDArray[np.float64]:
+def backup(mdp: MDP, V: ArrayLike, *, gamma: float) -> F64:
     """Look one step ahead of V: return Q(s, a) = Σ_k p_k (r_k + γ V(s'_k)).
 
     Parameters
@@ -457,7 +457,7 @@ def backup(mdp: MDP, V: ArrayLike, *, gamma: float) -> NDArray[np.float64]:
     return Q
 
 
-def greedy_policy(Q: ArrayLike) -> NDArray[np.signedinteger]:
+def greedy_policy(Q: ArrayLike) -> Ints:
     """Return the lowest of the best actions of each state.
 
     Actions whose values differ by less than 1e-10 of the state's largest |Q| are tied: rounding
@@ -489,7 +489,7 @@ def greedy_policy(Q: ArrayLike) -> NDArray[np.signedinteger]:
     return policy
 
 
-def optimal_actions(Q: ArrayLike, tolerance: float = 1e-9) -> NDArray[np.bool_]:
+def optimal_actions(Q: ArrayLike, tolerance: float = 1e-9) -> Bools:
     """Mark all best actions of each state: those within `tolerance` of the best.
 
     Parameters
@@ -519,17 +519,11 @@ def optimal_actions(Q: ArrayLike, tolerance: float = 1e-9) -> NDArray[np.bool_]:
     tolerance = checks.number("tolerance", tolerance, 0)
     margin = np.maximum(tolerance, TIE * np.abs(table).max(axis=1, keepdims=True))
     with np.errstate(over="ignore"):
-        best: NDArray[np.bool_] = table >= table.max(axis=1, keepdims=True) - margin
+        best: Bools = table >= table.max(axis=1, keepdims=True) - margin
     return best
 
 
-def _evaluate(
-    mdp: MDP,
-    policy: NDArray[np.signedinteger],
-    gamma: float,
-    threshold: float,
-    V: NDArray[np.float64],
-) -> int:
+def _evaluate(mdp: MDP, policy: Ints, gamma: float, threshold: float, V: F64) -> int:
     """Sweep V for one policy until no value changes by `threshold`; return how many sweeps."""
     _, transitions, reward = _opened(mdp.following(policy), gamma)
     Q = V[:, None].copy()
@@ -581,7 +575,7 @@ def _recording(name: str, progress: bool) -> Iterator[_Record]:
         yield _Record(bar)
 
 
-def _opened(mdp: MDP, gamma: float) -> tuple[float, Transitions, NDArray[np.float64]]:
+def _opened(mdp: MDP, gamma: float) -> tuple[float, Transitions, F64]:
     """Return discount, transitions and rewards, checked, as the kernels take them."""
     checks.instance("mdp", mdp, MDP, "an MDP (see MDP.from_env)")
     found = bounds.discount(gamma)
@@ -589,31 +583,25 @@ def _opened(mdp: MDP, gamma: float) -> tuple[float, Transitions, NDArray[np.floa
     return found, transitions, np.ascontiguousarray(mdp.reward)
 
 
-def _largest(reward: NDArray[np.float64], gamma: float) -> float:
+def _largest(reward: F64, gamma: float) -> float:
     """Return the largest |r|, checked to be one from which returns can be summed."""
     largest = _magnitude(reward)
     bounds.check_returns("mdp", largest, gamma)
     return largest
 
 
-def _magnitude(values: NDArray[np.float64]) -> float:
+def _magnitude(values: F64) -> float:
     """Return the largest absolute value, without an array of them all."""
     return max(abs(float(values.max())), abs(float(values.min())))
 
 
-def _above_zero(name: str, value: object) -> float:
-    return checks.number(name, value, above=0)
-
-
-def _action_values(Q: ArrayLike) -> NDArray[np.float64]:
+def _action_values(Q: ArrayLike) -> F64:
     table = checks.floats("Q", Q, (None, None))
     checks.require(table.size, "Q", table.shape, "an array with states and actions")
     return table
 
 
-def _blank(
-    mdp: MDP,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.signedinteger]]:
+def _blank(mdp: MDP) -> tuple[F64, F64, Ints]:
     """Return Q and V of zeros, and the policy that always takes action 0."""
     S, A = mdp.n_states, mdp.n_actions
     return np.zeros((S, A)), np.zeros(S), np.zeros(S, dtype=sweeps.action_type(A))

@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rl_core.checks import fields, instance, integers, one_of, optional, positive, require, truth
 from rl_core.identity import code_behind, imported
+from rl_core.kernels.arrays import F32
 from rl_core.kernels.likelihood import Policy
 from rl_core.kernels.networks import trainable_mask, xavier_uniform
 
@@ -220,7 +220,7 @@ def make_policy(
 
 def initial_parameters(
     policy: Policy, distribution: Categorical | Gaussian, rng: np.random.Generator
-) -> NDArray[np.float32]:
+) -> F32:
     """Draw the parameters to start from: Xavier-uniform weights, zero biases, log sigma as asked.
 
     Examples
@@ -236,9 +236,7 @@ def initial_parameters(
     return np.concatenate([network, log_sigma])
 
 
-def trainable(
-    policy: Policy, distribution: Categorical | Gaussian, biases: bool
-) -> NDArray[np.float32]:
+def trainable(policy: Policy, distribution: Categorical | Gaussian, biases: bool) -> F32:
     """Ones for the parameters that learn, zeros for those that stay as they are.
 
     Examples

@@ -30,43 +30,16 @@ from typing import Any, NamedTuple
 import gymnasium as gym
 import numpy as np
 from numba.extending import register_jitable
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from rl_core.checks import (
-    distinct_seeds,
-    fields,
-    floats,
-    instance,
-    integer,
-    integers,
-    number,
-    optional,
-    require,
-)
-from rl_core.exploration import (
-    EpsilonGreedy,
-    ExplorationRule,
-    Schedule,
-    Trials,
-    VisitDecay,
-    check_step_size,
-    values,
-)
-from rl_core.kernels.appraisal import (
-    RETURN,
-    Appraisal,
-    Yardstick,
-    as_table,
-    empty_record,
-    env_steps,
-    new_appraisal,
-    steps_so_far,
-    write_episode,
-    write_evaluation,
-    write_loss,
-)
+from rl_core import checks, exploration
+from rl_core.exploration import EpsilonGreedy, ExplorationRule, Schedule, Trials, VisitDecay
+from rl_core.kernels import appraisal
+from rl_core.kernels.appraisal import Appraisal, Yardstick
+from rl_core.kernels.arrays import F64, I64, Arrays
 from rl_core.kernels.choices import EPSILON_GREEDY, choose, step_size
 from rl_core.kernels.compiled import compiled
+from rl_core.kernels.model import NO_MODEL
 from rl_core.mdp import MDP
 from rl_core.planning import optimal_actions, value_iteration
 from rl_core.training import Failure, Progress, Run
@@ -77,9 +50,6 @@ from rl_core.worlds.tabular import DiscreteWorld, Draws, Played, start, step
 
 NO_LIMIT = 2**62
 Q_STAR_TOLERANCE = 1e-10
-
-Values = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -129,23 +99,23 @@ class QLearningConfig:
 
     def __post_init__(self) -> None:
         rules = "EpsilonGreedy(...), Softmax(...) or UnnormalisedSoftmax()"
-        fields(
+        checks.fields(
             self,
-            gamma=(number, 0, 1),
+            gamma=(checks.number, 0, 1),
             step_size=(_checked_step_size,),
-            exploration=(instance, ExplorationRule, rules),
-            max_steps=(optional, integer, 1),
-            max_env_steps=(optional, integer, 1),
-            evaluation=(instance, Trials, "Trials(...)"),
-            bins=(optional, checked_bins),
-            levels=(optional, integer, 2),
+            exploration=(checks.instance, ExplorationRule, rules),
+            max_steps=(checks.optional, checks.integer, 1),
+            max_env_steps=(checks.optional, checks.integer, 1),
+            evaluation=(checks.instance, Trials, "Trials(...)"),
+            bins=(checks.optional, checked_bins),
+            levels=(checks.optional, checks.integer, 2),
         )
         without = self.bins is None and self.levels is not None
-        require(not without, "levels", self.levels, "None where bins is None")
+        checks.require(not without, "levels", self.levels, "None where bins is None")
 
 
 def _checked_step_size(name: str, value: object) -> Any:
-    return value if isinstance(value, VisitDecay) else check_step_size(name, value)
+    return value if isinstance(value, VisitDecay) else exploration.check_step_size(name, value)
 
 
 def q_learning(
@@ -224,14 +194,14 @@ def q_learning(
     ((2, 112, 4), 200)
     """
     check_q_learning(env, config)
-    seeds = distinct_seeds(one_seed_of(env, seeds))
-    episodes = integer("episodes", episodes, 1)
-    at = integers("snapshots", snapshots, 0, episodes)
+    seeds = checks.distinct_seeds(one_seed_of(env, seeds))
+    episodes = checks.integer("episodes", episodes, 1)
+    at = checks.integers("snapshots", snapshots, 0, episodes)
     if progress is not None:
-        instance("progress", progress, Callable, "a function of episodes and steps, or None")
+        checks.instance("progress", progress, Callable, "a function of episodes and steps, or None")
     with _opened(env, config) as (_, model, shape):
         yardstick = make_yardstick(model, Q_star, shape)
-    task, record = _task(config, episodes), empty_record(len(seeds), episodes)
+    task, record = _task(config, episodes), appraisal.empty_record(len(seeds), episodes)
     arrays, failures = _empty_arrays(len(seeds), len(at), shape), []
     for i, seed in enumerate(seeds):
         own = {name: array[i] for name, array in arrays.items()}
@@ -239,8 +209,8 @@ def q_learning(
             failure = _train(world, task, yardstick, seed, at, own, record[i])
         failures += [] if failure is None else [failure]
         if progress is not None:
-            progress((i + 1) * episodes, env_steps(record))
-    return Run(as_table(record, seeds), arrays, tuple(failures))
+            progress((i + 1) * episodes, appraisal.env_steps(record))
+    return Run(appraisal.as_table(record, seeds), arrays, tuple(failures))
 
 
 def check_q_learning(env: object, config: object) -> None:
@@ -258,7 +228,7 @@ def check_q_learning(env: object, config: object) -> None:
     --------
     >>> check_q_learning("MountainCar-v0", QLearningConfig(bins=10))
     """
-    instance("config", config, QLearningConfig, "a QLearningConfig")
+    checks.instance("config", config, QLearningConfig, "a QLearningConfig")
     with _opened(env, config):
         pass
 
@@ -335,11 +305,11 @@ def check_q_learning_on_model(env: object, config: object) -> None:
     --------
     >>> check_q_learning_on_model("rl_core/Maze-v0", QLearningConfig())
     """
-    instance("env", env, str, "an environment's id")
-    instance("config", config, QLearningConfig, "a QLearningConfig")
+    checks.instance("env", env, str, "an environment's id")
+    checks.instance("config", config, QLearningConfig, "a QLearningConfig")
     assert isinstance(env, str)
     assert isinstance(config, QLearningConfig)
-    require(config.gamma < 1, "gamma", config.gamma, "below 1, for planning")
+    checks.require(config.gamma < 1, "gamma", config.gamma, "below 1, for planning")
     check_q_learning(MDP.from_env(env), config)
 
 
@@ -347,8 +317,8 @@ def check_q_learning_on_model(env: object, config: object) -> None:
 def _opened(env: Any, config: Any) -> Iterator[tuple[DiscreteWorld, MDP | None, tuple[int, int]]]:
     """Open the world to act in; give it with its model, if it has one, and the shape of Q."""
     if isinstance(env, MDP):
-        require(config.bins is None, "bins", config.bins, "None where states are numbered")
-        yield tabular.model_arrays(env), env, (env.n_states, env.n_actions)
+        checks.require(config.bins is None, "bins", config.bins, "None where states are numbered")
+        yield env.arrays(), env, (env.n_states, env.n_actions)
         return
     if config.bins is not None and (task := task_of(env)) is not None:
         grid = gridded(task, config.bins, levels=config.levels)
@@ -389,32 +359,20 @@ def make_yardstick(
     >>> int(yardstick.visitable.sum())
     92
     """
-    best = np.empty((0, shape[1])) if Q_star is None else floats("Q_star", Q_star, shape)
+    best = np.empty((0, shape[1])) if Q_star is None else checks.floats("Q_star", Q_star, shape)
     optimal = optimal_actions(best) if len(best) else best.astype(np.bool_)
     if model is None:
-        nowhere = np.empty((0, 0, 0))
-        return Yardstick(
-            best,
-            optimal,
-            np.empty(0, dtype=np.bool_),
-            *(nowhere.astype(np.int32), nowhere, nowhere, np.empty(0, dtype=np.bool_)),
-            *(np.empty(0, dtype=np.int32), np.empty(0)),
-        )
-    return Yardstick(
-        best,
-        optimal,
-        (model.reachable_states() & ~model.terminal)[: shape[0]],
-        *(model.successor, model.probability, model.reward, model.terminal),
-        *(model.start_state, model.start_probability),
-    )
+        return Yardstick(best, optimal, np.empty(0, dtype=np.bool_), NO_MODEL)
+    visitable = (model.reachable_states() & ~model.terminal)[: shape[0]]
+    return Yardstick(best, optimal, visitable, model.arrays())
 
 
 class _Task(NamedTuple):
     """The configuration as the loop reads it; schedules laid out over the episodes."""
 
     rule: int
-    parameter: NDArray[np.float64]
-    step_size: NDArray[np.float64]
+    parameter: F64
+    step_size: F64
     exponent: float
     gamma: float
     max_steps: int
@@ -432,8 +390,8 @@ def _task(config: QLearningConfig, episodes: int) -> _Task:
         initial, exponent = config.step_size, 0.0
     return _Task(
         rule=config.exploration.kind,
-        parameter=values(config.exploration.parameter, episodes),
-        step_size=values(initial, episodes),
+        parameter=exploration.values(config.exploration.parameter, episodes),
+        step_size=exploration.values(initial, episodes),
         exponent=exponent,
         gamma=config.gamma,
         max_steps=config.max_steps or NO_LIMIT,
@@ -449,12 +407,12 @@ def _learn(
     world: DiscreteWorld,
     task: _Task,
     yardstick: Yardstick,
-    appraisal: Appraisal,
+    known: Appraisal,
     draws: Draws,
     trial_draws: Draws,
-    Q: Values,
-    visits: Counts,
-    record: Values,
+    Q: F64,
+    visits: I64,
+    record: F64,
     first: int,
     last: int,
 ) -> int:
@@ -464,34 +422,28 @@ def _learn(
     its number instead.
     """
     for k in range(first, last):
-        left = task.max_env_steps - steps_so_far(record, k)
+        left = task.max_env_steps - appraisal.steps_so_far(record, k)
         if left <= 0:
             return k - 1
         max_steps = min(task.max_steps, left)
         outcome = _learn_episode(world, task, draws, Q, visits, k, max_steps)
-        write_episode(record, k, outcome, Q, yardstick)
+        appraisal.write_episode(record, k, outcome, Q, yardstick)
         if not np.isfinite(outcome[1]):
             return k
         on_trial = (k + 1) % task.trial_every == 0
         if on_trial or task.gamma < 1.0:
-            write_loss(record, k, Q, yardstick, task.gamma, appraisal)
+            appraisal.write_loss(record, k, Q, yardstick, task.gamma, known)
         if on_trial:
             trials = np.empty((task.trial_episodes, 2))
             for i in range(task.trial_episodes):
                 trials[i] = _try_episode(world, task, trial_draws, Q)
-            write_evaluation(record, k, trials)
+            appraisal.write_evaluation(record, k, trials)
     return last
 
 
 @register_jitable
 def _learn_episode(
-    world: DiscreteWorld,
-    task: _Task,
-    draws: Draws,
-    Q: Values,
-    visits: Counts,
-    k: int,
-    max_steps: int,
+    world: DiscreteWorld, task: _Task, draws: Draws, Q: F64, visits: I64, k: int, max_steps: int
 ) -> tuple[int, float, bool, int]:
     """Learn from episode k; return its steps, return, end and newly visited entries."""
     steps, total, new_entries, terminated, truncated = 0, 0.0, 0, False, False
@@ -511,7 +463,7 @@ def _learn_episode(
 
 
 @register_jitable
-def _try_episode(world: DiscreteWorld, task: _Task, draws: Draws, Q: Values) -> tuple[float, float]:
+def _try_episode(world: DiscreteWorld, task: _Task, draws: Draws, Q: F64) -> tuple[float, float]:
     """Play an episode of the evaluation; return its return and steps."""
     steps, total, terminated, truncated = 0, 0.0, False, False
     s = start(world, draws)
@@ -529,7 +481,7 @@ _learn_compiled = compiled(_learn)
 
 @compiled
 def _update(
-    Q: Values, s: int, a: int, r: float, s_next: int, terminated: bool, alpha: float, gamma: float
+    Q: F64, s: int, a: int, r: float, s_next: int, terminated: bool, alpha: float, gamma: float
 ) -> None:
     """Pull Q(s, a) towards the target r + gamma max_a' Q(s', a')."""
     target = r
@@ -541,11 +493,9 @@ def _update(
     Q[s, a] += alpha * (target - Q[s, a])
 
 
-def _empty_arrays(
-    n_seeds: int, n_snapshots: int, shape: tuple[int, int]
-) -> dict[str, NDArray[Any]]:
+def _empty_arrays(n_seeds: int, n_snapshots: int, shape: tuple[int, int]) -> Arrays:
     """Return tables and counts of zeros for every seed, and room for the snapshots of both."""
-    arrays: dict[str, NDArray[Any]] = {}
+    arrays: Arrays = {}
     for name, dtype in (("Q", np.float64), ("visits", np.int64)):
         arrays[name] = np.zeros((n_seeds, *shape), dtype)
     for name in ("Q", "visits") if n_snapshots else ():
@@ -559,12 +509,12 @@ def _train(
     yardstick: Yardstick,
     seed: int,
     snapshots: Sequence[int],
-    arrays: dict[str, NDArray[Any]],
-    record: Values,
+    arrays: Arrays,
+    record: F64,
 ) -> Failure | None:
     """Run one seed, pausing at the snapshots; return why it failed, if it did."""
     learn = _learn if isinstance(world, Played) else _learn_compiled
-    draws, appraisal = tabular.spawn_draws(seed, 2), new_appraisal(yardstick)
+    draws, known = tabular.spawn_draws(seed, 2), appraisal.new_appraisal(yardstick)
     if isinstance(world, Played):
         world.env.reset(seed=seed)  # for what else the environment draws from
     if isinstance(world, GriddedTask) and world.max_steps > 0:
@@ -575,13 +525,13 @@ def _train(
     for last in sorted({*snapshots, episodes}):
         Q, visits = arrays["Q"], arrays["visits"]
         stopped = learn(
-            world, task, yardstick, appraisal, draws[0], draws[1], Q, visits, record, first, last
+            world, task, yardstick, known, draws[0], draws[1], Q, visits, record, first, last
         )
         ended = stopped < last  # then later snapshots are of the last table
         for j in [j for j, at in enumerate(snapshots) if at == last or (ended and at > last)]:
             arrays["Q_snapshots"][j], arrays["visits_snapshots"][j] = arrays["Q"], arrays["visits"]
         if ended:
-            bad = not np.isfinite(record[stopped, RETURN])
+            bad = not np.isfinite(record[stopped, appraisal.RETURN])
             return Failure(seed, stopped + 1, "the return is not finite") if bad else None
         first = last
     return None

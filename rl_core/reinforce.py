@@ -26,27 +26,18 @@ from collections.abc import Callable, Iterable
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
-from rl_core import modules
+from rl_core import modules, policies
 from rl_core.checks import fields, instance, integer, number, one_of, optional, positive, truth
 from rl_core.kernels import likelihood
+from rl_core.kernels.arrays import F32, F64, I64, Arrays
 from rl_core.kernels.compiled import compiled
 from rl_core.kernels.likelihood import Actor, Policy
-from rl_core.policies import (
-    MLP,
-    Categorical,
-    Gaussian,
-    Network,
-    check_network,
-    initial_parameters,
-    make_policy,
-    trainable,
-)
+from rl_core.policies import MLP, Categorical, Gaussian, Network
 from rl_core.training import Progress, Run, Training, spawn_streams, train_seeds
 from rl_core.worlds.environments import EnvironmentLike, World, one_seed_of, open_world
 from rl_core.worlds.episodes import ModuleActor, Trajectory, play_episode, with_constant
@@ -119,11 +110,11 @@ class ReinforceConfig:
             max_env_steps=(optional, integer, 1),
             learn_from_capped=(truth,),
         )
-        object.__setattr__(self, "engine", check_network(self.network, self.engine))
+        object.__setattr__(self, "engine", policies.check_network(self.network, self.engine))
 
 
 @compiled
-def discounted_returns(rewards: NDArray[np.float64], gamma: float) -> NDArray[np.float64]:
+def discounted_returns(rewards: F64, gamma: float) -> F64:
     """v_t = r_{t+1} + gamma v_{t+1}, backwards from v_T = 0.
 
     Parameters
@@ -149,7 +140,7 @@ def discounted_returns(rewards: NDArray[np.float64], gamma: float) -> NDArray[np
 
 
 @compiled
-def normalised(returns: NDArray[np.float64], centre: bool, scale: bool) -> NDArray[np.float64]:
+def normalised(returns: F64, centre: bool, scale: bool) -> F64:
     """Shift returns to mean 0 if `centre`, and scale them to variance 1 if `scale` as well.
 
     Examples
@@ -159,7 +150,7 @@ def normalised(returns: NDArray[np.float64], centre: bool, scale: bool) -> NDArr
     """
     if not centre:
         return returns
-    deviations: NDArray[np.float64] = returns - returns.mean()
+    deviations: F64 = returns - returns.mean()
     deviation = math.sqrt((deviations * deviations).mean())
     if scale:
         equal = deviation <= 1e-12 * abs(returns.mean())  # up to rounding
@@ -217,13 +208,7 @@ class TorchLearner:
         )
         return -(v * log_pi).mean()
 
-    def learn(
-        self,
-        observations: NDArray[np.float32],
-        actions: NDArray[np.float32],
-        returns: NDArray[np.float64],
-        orders: NDArray[np.int64],
-    ) -> None:
+    def learn(self, observations: F32, actions: F32, returns: F64, orders: I64) -> None:
         """Learn from an episode: a step of the optimiser a minibatch; see `likelihood.learn`."""
         s = torch.from_numpy(with_constant(self.policy, observations))
         a, v = torch.from_numpy(actions), torch.from_numpy(returns).float()
@@ -240,14 +225,14 @@ class _Agent(NamedTuple):
 
     actor: Actor | ModuleActor
     learn: Callable[..., None]
-    arrays: Callable[[], dict[str, NDArray[Any]]]
+    arrays: Callable[[], Arrays]
 
 
 def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator) -> _Agent:
     """Draw the initial weights and set up the engine that learns them."""
     hidden = config.network.hidden if isinstance(config.network, MLP) else ()
     spaces = world.n_observations, world.n_actions, world.action_dimensions
-    policy = make_policy(config.policy, hidden, *spaces)
+    policy = policies.make_policy(config.policy, hidden, *spaces)
     n_sigmas = policy.action_width if policy.gaussian else 0
     if not isinstance(config.network, MLP):
         n_inputs, n_outputs = policy.sizes.tolist()
@@ -256,15 +241,15 @@ def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator)
         log_sigma = _log_sigma(config, torch.full((n_sigmas,), start))
         learner = TorchLearner(policy, module, log_sigma, config)
 
-        def by_name() -> dict[str, NDArray[Any]]:
+        def by_name() -> Arrays:
             sigma = {"log_sigma": log_sigma.detach().numpy()} if policy.gaussian else {}
             return {**modules.as_arrays(module), **sigma}
 
         return _Agent(ModuleActor(policy, module, log_sigma), learner.learn, by_name)
     biases = config.network.biases
-    parameters = initial_parameters(policy, config.policy, rng)
+    parameters = policies.initial_parameters(policy, config.policy, rng)
 
-    def layers() -> dict[str, NDArray[Any]]:
+    def layers() -> Arrays:
         named = likelihood.unpack(policy, parameters)
         return {name: array for name, array in named.items() if biases or "bias" not in name}
 
@@ -275,7 +260,7 @@ def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator)
         log_sigma = _log_sigma(config, vector[len(vector) - n_sigmas :])
         learn = TorchLearner(policy, module, log_sigma, config).learn
     else:
-        learns = trainable(policy, config.policy, biases)
+        learns = policies.trainable(policy, config.policy, biases)
         rates = config.batch_size, config.learning_rate
         learn = partial(
             likelihood.learn, likelihood.make_learner(policy, parameters, learns, *rates)
@@ -288,7 +273,7 @@ def _log_sigma(config: ReinforceConfig, start: torch.Tensor) -> torch.nn.Paramet
     return torch.nn.Parameter(start, requires_grad=learns)
 
 
-def _orders(config: ReinforceConfig, steps: int, rng: np.random.Generator) -> NDArray[np.int64]:
+def _orders(config: ReinforceConfig, steps: int, rng: np.random.Generator) -> I64:
     """Draw the order of the steps in each epoch; where one batch takes all it is of no account."""
     orders = np.tile(np.arange(steps), (config.epochs, 1))
     if steps > config.batch_size:

@@ -122,12 +122,9 @@ def is_project(module: str) -> bool:
 
 def _outside(spec: ModuleSpec) -> bool:
     """Whether a module lies in no folder of installed packages."""
-    folder = str(spec.origin) if spec.has_location else next(iter(_folders(spec)), "site-packages")
+    folders = spec.submodule_search_locations or ["site-packages"]  # of a module without a file
+    folder = str(spec.origin) if spec.has_location else folders[0]
     return _top(spec.name) not in sys.stdlib_module_names and not _INSTALLED & {*Path(folder).parts}
-
-
-def _folders(spec: ModuleSpec) -> list[str]:
-    return list(spec.submodule_search_locations or ())
 
 
 def _top(module: str) -> str:
@@ -147,12 +144,8 @@ def _spec(module: str) -> ModuleSpec | None:
     return spec if spec is not None and _is_source(spec) else None
 
 
-def _path(spec: ModuleSpec) -> Path:
-    return Path(str(spec.origin))
-
-
 def _source(spec: ModuleSpec) -> str:
-    return importlib.util.decode_source(_path(spec).read_bytes())
+    return importlib.util.decode_source(Path(str(spec.origin)).read_bytes())
 
 
 @cache

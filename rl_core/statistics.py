@@ -12,19 +12,11 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import stats
 
-from rl_core.checks import (
-    distinct_seeds,
-    floats,
-    generator,
-    instance,
-    integer,
-    number,
-    one_of,
-    require,
-)
+from rl_core import checks
+from rl_core.kernels.arrays import F64, I64, Bools
 from rl_core.kernels.compiled import compiled
 
 Statistic = Callable[..., Any]
@@ -115,7 +107,7 @@ def bootstrap_interval(
 
 def _bootstrap(
     name: str,
-    values: NDArray[np.float64],
+    values: F64,
     statistic: Statistic,
     rng: np.random.Generator,
     level: float,
@@ -124,7 +116,7 @@ def _bootstrap(
 ) -> Interval:
     level, resamples = _checked_draws(rng, level, resamples)
     unknown = np.isnan(values.T).any(axis=-1)
-    require(values.ndim == 2 or not unknown, name, values, "without NaN")
+    checks.require(values.ndim == 2 or not unknown, name, values, "without NaN")
     n_seeds = len(values)
     points = values.reshape(n_seeds, -1).T.copy()
     trim = _trim(statistic, n_seeds)
@@ -176,10 +168,10 @@ def paired_difference_interval(
     2.0
     """
     a, b = _array("a", a, 1, 2), _array("b", b, 1, 2)
-    require(a.shape == b.shape, "b", b.shape, f"of the shape of a, {a.shape}")
+    checks.require(a.shape == b.shape, "b", b.shape, f"of the shape of a, {a.shape}")
     if np.isinf(a).any() or np.isinf(b).any():
         allowed = "np.median where a or b is infinite for some seed"
-        require(statistic is np.median, "statistic", statistic, allowed)
+        checks.require(statistic is np.median, "statistic", statistic, allowed)
     with np.errstate(invalid="ignore", over="ignore"):
         differences = np.where(np.isinf(a) & (a == b), 0.0, a - b)
     return _bootstrap("a - b", differences, statistic, rng, level, resamples, anything=0.0)
@@ -223,9 +215,12 @@ def probability_of_improvement(
     >>> tuple(probability_of_improvement([np.inf], [np.inf], rng=rng))
     (0.5, 0.0, 1.0)
     """
-    a, b = floats("a", a, (None,), finite=False), floats("b", b, (None,), finite=False)
-    require(len(a), "a", a, "not empty")
-    require(len(b), "b", b, "not empty")
+    a, b = (
+        checks.floats("a", a, (None,), finite=False),
+        checks.floats("b", b, (None,), finite=False),
+    )
+    checks.require(len(a), "a", a, "not empty")
+    checks.require(len(b), "b", b, "not empty")
     level, resamples = _checked_draws(rng, level, resamples)
     if np.isposinf(a).all() and np.isposinf(b).all():
         return Interval(0.5, 0.0, 1.0)
@@ -254,9 +249,9 @@ def proportion_interval(successes: int, trials: int, *, level: float = 0.95) -> 
     >>> f"{estimate:.2f} [{low:.2f}, {high:.2f}]"
     '0.90 [0.74, 0.97]'
     """
-    level = number("level", level, above=0, below=1)
-    trials = integer("trials", trials, 1)
-    successes = integer("successes", successes, 0, trials)
+    level = checks.number("level", level, above=0, below=1)
+    trials = checks.integer("trials", trials, 1)
+    successes = checks.integer("successes", successes, 0, trials)
     limits = stats.binomtest(successes, trials).proportion_ci(level, method="wilson")
     return _interval(successes / trials, float(limits.low), float(limits.high))
 
@@ -269,7 +264,7 @@ def learning_curves(
     episodes: int,
     window: int = 1,
     average: Literal["median", "mean"] = "median",
-) -> NDArray[np.float64]:
+) -> F64:
     """Return a column of one arm's table as one curve a seed, smoothed over the last episodes.
 
     Parameters
@@ -308,21 +303,23 @@ def learning_curves(
            [80., nan],
            [nan, nan]])
     """
-    seeds, episodes = distinct_seeds(seeds), integer("episodes", episodes, 1)
-    window = integer("window", window, 1)
-    one_of("average", average, ("median", "mean"))
-    instance("table", table, pd.DataFrame, "a pandas.DataFrame")
+    seeds, episodes = checks.distinct_seeds(seeds), checks.integer("episodes", episodes, 1)
+    window = checks.integer("window", window, 1)
+    checks.one_of("average", average, ("median", "mean"))
+    checks.instance("table", table, pd.DataFrame, "a pandas.DataFrame")
     missing = {"seed", "episode", column} - set(table.columns)
-    require(not missing, "table", list(table.columns), f"with the columns {sorted(missing)} too")
-    floats(column, table[column], (None,), finite=False)
+    checks.require(
+        not missing, "table", list(table.columns), f"with the columns {sorted(missing)} too"
+    )
+    checks.floats(column, table[column], (None,), finite=False)
     twice = table.duplicated(["seed", "episode"]).any()
-    require(not twice, "table", "several rows for a seed and episode", "of a single arm")
+    checks.require(not twice, "table", "several rows for a seed and episode", "of a single arm")
     wide = table.pivot(index="episode", columns="seed", values=column)
     others = sorted(set(wide.columns) - set(seeds))
-    require(not others, "seeds", seeds, f"all that the table has, {others} too")
+    checks.require(not others, "seeds", seeds, f"all that the table has, {others} too")
     fits = wide.index.isin(range(1, episodes + 1)).all()
     longest = f"{wide.index.min()} to {wide.index.max()}"
-    require(fits, "episodes", episodes, f"1 to the last of the table, which has {longest}")
+    checks.require(fits, "episodes", episodes, f"1 to the last of the table, which has {longest}")
     wide = wide.astype(np.float64).reindex(index=range(1, episodes + 1), columns=list(seeds))
     trailing = wide.rolling(window, min_periods=1)
     smooth = trailing.median() if average == "median" else trailing.mean()
@@ -337,7 +334,7 @@ def learning_curves(
     return curves
 
 
-def learned(curves: ArrayLike, threshold: float, *, window: int) -> NDArray[np.bool_]:
+def learned(curves: ArrayLike, threshold: float, *, window: int) -> Bools:
     """Return which seeds learn: the median over the last `window` episodes is at most `threshold`.
 
     Parameters
@@ -367,15 +364,13 @@ def learned(curves: ArrayLike, threshold: float, *, window: int) -> NDArray[np.b
     array([ True, False, False])
     """
     curves = _array("curves", curves, 2)
-    window = integer("window", window, 1, curves.shape[1])
-    threshold = floats("threshold", [threshold], (1,), finite=False)[0]
+    window = checks.integer("window", window, 1, curves.shape[1])
+    threshold = checks.floats("threshold", [threshold], (1,), finite=False)[0]
     with np.errstate(invalid="ignore"):
         return np.asarray(np.median(curves[:, -window:], axis=1) <= threshold)
 
 
-def episodes_to_threshold(
-    curves: ArrayLike, threshold: float, *, hold: int = 1
-) -> NDArray[np.float64]:
+def episodes_to_threshold(curves: ArrayLike, threshold: float, *, hold: int = 1) -> F64:
     """Return the episode from which each seed stays at or below `threshold` for `hold` episodes.
 
     Parameters
@@ -403,20 +398,15 @@ def episodes_to_threshold(
     array([ 4., inf])
     """
     curves = _array("curves", curves, 2)
-    hold = integer("hold", hold, 1, curves.shape[1])
-    threshold = floats("threshold", [threshold], (1,), finite=False)[0]
+    hold = checks.integer("hold", hold, 1, curves.shape[1])
+    threshold = checks.floats("threshold", [threshold], (1,), finite=False)[0]
     windows = np.lib.stride_tricks.sliding_window_view(curves <= threshold, hold, axis=1)
     below = np.all(windows, axis=2)
     return np.where(below.any(axis=1), below.argmax(axis=1) + 1.0, np.inf)
 
 
 @compiled
-def _trimmed_means(
-    ordered: NDArray[np.float64],
-    order: NDArray[np.int64],
-    counts: NDArray[np.int64],
-    trim: int,
-) -> NDArray[np.float64]:
+def _trimmed_means(ordered: F64, order: I64, counts: I64, trim: int) -> F64:
     """Return the trimmed mean of each draw at each point, shape (points, resamples).
 
     Row p of `ordered` has the values of point p in order, and of `order` the seeds they belong to.
@@ -451,12 +441,12 @@ def _trim(statistic: Statistic, n: int) -> int:
     raise ValueError(f"statistic must be np.median, np.mean or iqm, got {statistic!r}")
 
 
-def _seed_counts(n_seeds: int, resamples: int, rng: np.random.Generator) -> NDArray[np.int64]:
+def _seed_counts(n_seeds: int, resamples: int, rng: np.random.Generator) -> I64:
     """Return how often each seed is drawn: n draws with replacement, shape (resamples, seeds)."""
     return rng.multinomial(n_seeds, np.full(n_seeds, 1 / n_seeds), size=resamples)
 
 
-def _limits(drawn: NDArray[np.float64], level: float) -> tuple[Any, Any]:
+def _limits(drawn: F64, level: float) -> tuple[Any, Any]:
     """Return the percentile limits over the last axis, as values that occur.
 
     No interpolation, because between two infinities there is no number. A draw that is none, since
@@ -478,7 +468,7 @@ def _interval(estimate: Any, low: Any, high: Any) -> Interval:
 
 def _averaged(
     name: str,
-    values: NDArray[np.float64],
+    values: F64,
     statistic: Statistic,
     *trim: float,
     axis: int,
@@ -493,12 +483,12 @@ def _averaged(
     unknown = np.isnan(values).any(axis=axis)
     between = np.isnan(middle) & ~unknown
     allowed = "without infinities of both signs in the middle"
-    require(anything is not None or not between.any(), name, values, allowed)
+    checks.require(anything is not None or not between.any(), name, values, allowed)
     middle[between] = anything
     return np.where(unknown, np.nan, middle)
 
 
-def _array(name: str, values: ArrayLike, *dimensions: int) -> NDArray[np.float64]:
+def _array(name: str, values: ArrayLike, *dimensions: int) -> F64:
     """Return numbers as float64, not empty; NaN stands for what is missing."""
     try:
         given = np.asarray(values)
@@ -508,12 +498,14 @@ def _array(name: str, values: ArrayLike, *dimensions: int) -> NDArray[np.float64
     missing = pd.isna(given) if given.dtype.kind in "fO" else np.zeros(given.shape, bool)
     if missing.any() or given.dtype.kind == "b":
         given = np.where(missing, 0.0, given)
-    array = floats(name, given, shape, finite=False)
-    require(array.size, name, array, "not empty")
+    array = checks.floats(name, given, shape, finite=False)
+    checks.require(array.size, name, array, "not empty")
     array[missing] = np.nan
     return array
 
 
 def _checked_draws(rng: object, level: float, resamples: int) -> tuple[float, int]:
-    generator("rng", rng)
-    return number("level", level, above=0, below=1), integer("resamples", resamples, 1)
+    checks.generator("rng", rng)
+    return checks.number("level", level, above=0, below=1), checks.integer(
+        "resamples", resamples, 1
+    )

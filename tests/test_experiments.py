@@ -259,17 +259,6 @@ def test_python_itself_counts(monkeypatch):
     assert PLAIN.identity() != before
 
 
-def test_what_takes_longest_goes_first(tmp_path, seeds_run):
-    long = Arm("long", learn, "CartPole-v1", ToyConfig(seconds=0.01), 5)
-    short = Arm("short", learn, "CartPole-v1", ToyConfig(), 40)
-    run([short, long], seeds=[0], store=tmp_path, workers=1, **quiet)
-    assert seeds_run == [("short", 0), ("long", 0)]  # unknown: as given
-    seeds_run.clear()
-    new = Arm("new", learn, "CartPole-v1", ToyConfig(step_size=0.3), 1)
-    run([short, long, new], seeds=[0, 1], store=tmp_path, workers=1, **quiet)
-    assert seeds_run == [("new", 0), ("new", 1), ("long", 1), ("short", 1)]
-
-
 # --- a result is served only for what made it -----------------------------------------------------
 
 

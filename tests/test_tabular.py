@@ -13,7 +13,6 @@ from rl_core.q_learning import QLearningConfig, q_learning
 from rl_core.worlds.discretise import GriddedTask, gridded
 from rl_core.worlds.tabular import (
     known_model,
-    model_arrays,
     played,
     spawn_draws,
     start,
@@ -97,7 +96,7 @@ def test_a_reward_may_be_a_number_of_any_kind(reward):
 
 @pytest.mark.parametrize("env", ["rl_core/Maze-v0", "FrozenLake-v1", "CliffWalking-v1", "Taxi-v4"])
 def test_an_environment_and_its_model_behave_alike(env):
-    model, world = model_arrays(MDP.from_env(env)), played(gym.make(env).unwrapped)
+    model, world = MDP.from_env(env).arrays(), played(gym.make(env).unwrapped)
     for seed in (0, 1):
         draws = [spawn_draws(seed, 1)[0] for _ in range(2)]
         rng, over, truncated = np.random.default_rng(seed), True, False

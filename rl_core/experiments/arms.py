@@ -13,7 +13,7 @@ from rl_core.training import Run
 from rl_core.worlds import names
 from rl_core.worlds.names import EnvironmentName, Make
 
-FORMAT = 2  # of what the store keeps; part of every digest
+FORMAT = 3  # of what the store keeps; part of every digest
 TAKEN = {"arm", "seed", "episode", "steps", "return", "terminated", "env_steps"}  # columns
 
 Label = str | int | float | bool

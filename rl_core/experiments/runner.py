@@ -21,14 +21,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from os import getpid
 from pathlib import Path
-from typing import Any
 
 import joblib
 import numpy as np
 import pandas as pd
 from joblib.externals.loky import get_reusable_executor
 from joblib.parallel import BACKENDS, EXTERNAL_BACKENDS
-from numpy.typing import NDArray
 
 from rl_core.checks import distinct_seeds, instance, integer, one_of, optional, require
 from rl_core.experiments.arms import Arm
@@ -36,6 +34,7 @@ from rl_core.experiments.progress import Progress
 from rl_core.experiments.store import DamagedResultError, Store, Stored, scratch, sweep
 from rl_core.experiments.workers import Outcome, Task, run_task, use_threads
 from rl_core.identity import canonical_json, digest
+from rl_core.kernels.arrays import Arrays
 
 TEMPORARY = "rl_core-"  # what joblib's temporary folders are called
 
@@ -66,7 +65,7 @@ class Results:
     provenance: pd.DataFrame
     _store: Store = field(repr=False)
 
-    def arrays(self, arm: str) -> dict[str, NDArray[Any]]:
+    def arrays(self, arm: str) -> Arrays:
         """Return what the seeds of `arm` learned: each array's first axis is the seed.
 
         Raises
@@ -211,7 +210,7 @@ def _work(tasks: Sequence[Task], store: Store, workers: int, backend: str, progr
     with _told(store), scratch(store.path / "scratch"):
         pass
     first = {task.digest: task for task in reversed(tasks)}  # arms may differ in name only
-    work = _longest_first([task for task in tasks if first[task.digest] is task], store)
+    work = [task for task in tasks if first[task.digest] is task]
     failed: list[Outcome] = []
     with (
         Progress(Counter(task.arm.name for task in work), progress) as shown,
@@ -271,26 +270,6 @@ def _temporary() -> Path:
     raise ValueError(
         f"TMPDIR must be a folder with a short name in ASCII, got {tempfile.gettempdir()!r}"
     )
-
-
-def _longest_first(tasks: list[Task], store: Store) -> list[Task]:
-    """Return `tasks` by the time they took when last run, those never run before all others.
-
-    Nothing is known of those: they stay in the order given.
-    """
-    seconds = {_work_of(made): made["seconds"] for made in store.provenances()}
-
-    def expected(task: Task) -> float:
-        known: float = seconds.get(_work_of(task.identity), np.inf)
-        return known
-
-    return sorted(tasks, key=expected, reverse=True)
-
-
-def _work_of(identity: Mapping[str, Any]) -> str:
-    """Return what decides how long a seed takes, the code's version aside."""
-    keys = ("algorithm", "env", "config", "episodes")
-    return canonical_json([identity[key] for key in keys])
 
 
 def _results(stored: Mapping[Task, Stored], store: Store) -> Results:

@@ -1,11 +1,11 @@
-"""The result store: each result under the digest of what made it, in Parquet and JSON.
+"""The result store: each result under the digest of what made it, in open formats.
 
 A result is one seed of one arm, in a folder of its own, named by its digest:
 
     results/<digest>/table.parquet    the tidy table
-    results/<digest>/arrays.parquet   what was learned: one row, one column an array, flattened
+    results/<digest>/arrays.npz       what was learned, in NumPy's format, without pickle
     results/<digest>/record.json      failures, provenance, and the checksum of every file
-    scratch/                          folders being written, each locked by its writer
+    scratch/                          folders being written, each beside a lock of its writer
 
 A result appears whole or not at all: its folder is written in `scratch`, flushed to the disk, and
 then renamed. Every byte is under a checksum, so damage is found when a result is read. Several
@@ -14,11 +14,10 @@ processes may use one store at once.
 
 import contextlib
 import hashlib
-import importlib
+import io
 import json
 import os
 import shutil
-import time
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -29,14 +28,13 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
+from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
+from rl_core.kernels.arrays import Arrays
 from rl_core.training import Failure
 
-_fcntl: Any = importlib.import_module("fcntl") if os.name == "posix" else None
-
-TABLE, ARRAYS, RECORD = "table.parquet", "arrays.parquet", "record.json"
-STALE_SECONDS = 600.0  # of what cannot be locked
+TABLE, ARRAYS, RECORD = "table.parquet", "arrays.npz", "record.json"
 
 
 class DamagedResultError(Exception):
@@ -105,15 +103,11 @@ class Store:
         """
         files = {
             TABLE: _parquet(pa.Table.from_pandas(table, preserve_index=False)),
-            ARRAYS: _parquet(_flattened(arrays)),
+            ARRAYS: _npz(arrays),
         }
         record = {
             "digest": digest,
             "files": {name: hashlib.sha256(data).hexdigest() for name, data in files.items()},
-            "arrays": {
-                name: {"dtype": array.dtype.str, "shape": list(array.shape)}
-                for name, array in arrays.items()
-            },
             "failures": [asdict(failure) for failure in failures],
             "provenance": dict(provenance),
         }
@@ -141,7 +135,7 @@ class Store:
             provenance=record["provenance"],
         )
 
-    def read_arrays(self, digest: str) -> dict[str, NDArray[Any]]:
+    def read_arrays(self, digest: str) -> Arrays:
         """Return the arrays of the result under `digest`, bit for bit as they were written.
 
         Raises
@@ -154,30 +148,15 @@ class Store:
         found = self._verified(digest)
         if found is None:
             raise KeyError(f"no result {digest} in the store")
-        record, files = found
-        columns = _columns(files[ARRAYS])
-        return {
-            name: _unflattened(columns[name], form["dtype"], form["shape"])
-            for name, form in record["arrays"].items()
-        }
-
-    def provenances(self) -> list[dict[str, Any]]:
-        """Return the provenance of every result whose record is intact, tables not looked at."""
-        found = []
-        for folder in sorted((self.path / "results").glob("*")):
-            try:
-                record = _unsealed(folder / RECORD)
-            except (DamagedResultError, FileNotFoundError):
-                continue
-            found.append(record["provenance"])
-        return found
+        with np.load(io.BytesIO(found[1][ARRAYS])) as arrays:
+            return dict(arrays)
 
     def clean(self) -> None:
         """Remove what killed writers left behind."""
         sweep(self.path / "scratch", "*")
 
     def _verified(self, digest: str) -> tuple[dict[str, Any], dict[str, bytes]] | None:
-        """Return the record and the Parquet files of a result, each checked against its checksum.
+        """Return the record and the files of a result, each checked against its checksum.
 
         What is parsed later are these very bytes.
         """
@@ -227,74 +206,44 @@ def scratch(parent: Path, prefix: str = "") -> Iterator[Path]:
     The lock goes with the process, however that ends, so that `sweep` can tell the dead.
     """
     parent.mkdir(parents=True, exist_ok=True)
-    lock = None
-    while lock is None:  # a sweep may take a folder that is not locked yet
-        folder = parent / f"{prefix}{uuid.uuid4().hex}"
+    folder = parent / f"{prefix}{uuid.uuid4().hex}"
+    with _lock_of(folder):
         folder.mkdir()
-        lock = _locked(folder)
-    try:
-        yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-        if lock >= 0:
-            os.close(lock)
+        try:
+            yield folder
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def sweep(parent: Path, pattern: str) -> None:
-    """Remove the folders of that kind whose makers are dead."""
-    for folder in parent.glob(pattern):
-        lock = _locked(folder)
-        if lock is None:
-            continue
-        with contextlib.suppress(FileNotFoundError):  # another process was quicker
-            if lock >= 0 or time.time() - folder.stat().st_mtime > STALE_SECONDS:
-                shutil.rmtree(folder, ignore_errors=True)
-        if lock >= 0:
-            os.close(lock)
+    """Remove the folders of that kind whose makers are dead, and their locks."""
+    for folder in {path.with_suffix("") for path in parent.glob(pattern)}:
+        with contextlib.suppress(Timeout, OSError), _lock_of(folder, timeout=0):
+            shutil.rmtree(folder, ignore_errors=True)
 
 
-def _locked(folder: Path) -> int | None:
-    """Return the handle of the lock on a folder, None if another has it or the folder is gone.
-
-    -1 where there are no such locks (Windows, some network drives): there, age has to tell.
-    """
-    if _fcntl is None:
-        return -1
-    try:
-        handle = os.open(folder, os.O_RDONLY)
-    except FileNotFoundError:
-        return None
-    except OSError:
-        return -1
-    try:
-        _fcntl.flock(handle, _fcntl.LOCK_EX | _fcntl.LOCK_NB)
-    except OSError as error:
-        os.close(handle)
-        return None if isinstance(error, BlockingIOError) else -1
-    if folder.exists():
-        return handle
-    os.close(handle)
-    return None
+@contextlib.contextmanager
+def _lock_of(folder: Path, timeout: float = -1) -> Iterator[None]:
+    """Hold the lock beside a folder; it is there for as long as somebody holds it."""
+    with FileLock(f"{folder}.lock", timeout=timeout) as lock:
+        try:
+            yield
+        finally:
+            with contextlib.suppress(OSError):
+                os.unlink(lock.lock_file)
 
 
-def _flattened(arrays: Mapping[str, NDArray[Any]]) -> pa.Table:
-    """Return a table with one row and, for each array, a column that lists its elements."""
-    columns = {}
+def _npz(arrays: Mapping[str, NDArray[Any]]) -> bytes:
+    """Return `arrays` as a file in NumPy's format."""
     for name, array in arrays.items():
-        dtype = array.dtype
-        if dtype.kind not in "biuf" or dtype.itemsize > 8 or not dtype.isnative:
+        if array.dtype.kind not in "biuf" or not array.dtype.isnative:
             raise TypeError(
-                f"array {name!r} has dtype {dtype}; allowed are bool, integers and floats of up to "
-                "64 bits in the machine's byte order"
+                f"array {name!r} has dtype {array.dtype}; allowed are bool, integers and floats in "
+                "the machine's byte order"
             )
-        elements = pa.array(np.ascontiguousarray(array).reshape(-1))
-        columns[name] = pa.ListArray.from_arrays([0, len(elements)], elements)
-    return pa.table(columns)
-
-
-def _unflattened(column: pa.ChunkedArray, dtype: str, shape: Sequence[int]) -> NDArray[Any]:
-    elements: NDArray[Any] = column.combine_chunks().values.to_numpy(zero_copy_only=False)
-    return elements.astype(dtype, copy=True).reshape(shape)
+    sink = io.BytesIO()
+    np.savez_compressed(sink, **arrays)  # type: ignore[arg-type]
+    return sink.getvalue()
 
 
 def _parquet(table: pa.Table) -> bytes:

@@ -12,9 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
+from rl_core.kernels.arrays import F64, I32, I64, Bools
 from rl_core.kernels.compiled import compiled
+from rl_core.kernels.model import Model
 
 TOLERANCE = 1e-12
 """How far values may still move in a sweep when a policy counts as evaluated."""
@@ -50,19 +51,14 @@ class Yardstick(NamedTuple):
     visitable : ndarray of bool, shape (S,)
         States that are not terminal and can be reached from the start: those whose entries
         experience can ever change.
-    successor, probability, reward, terminal, start_state, start_probability
-        The model; see `rl_core.mdp.MDP`.
+    model : Model
+        The model.
     """
 
-    Q_star: NDArray[np.float64]
-    optimal: NDArray[np.bool_]
-    visitable: NDArray[np.bool_]
-    successor: NDArray[np.int32]
-    probability: NDArray[np.float64]
-    reward: NDArray[np.float64]
-    terminal: NDArray[np.bool_]
-    start_state: NDArray[np.int32]
-    start_probability: NDArray[np.float64]
+    Q_star: F64
+    optimal: Bools
+    visitable: Bools
+    model: Model
 
 
 class Appraisal(NamedTuple):
@@ -85,11 +81,11 @@ class Appraisal(NamedTuple):
         The value lost.
     """
 
-    greedy: NDArray[np.bool_]
-    order: NDArray[np.int32]
-    found: NDArray[np.int64]
-    V: NDArray[np.float64]
-    lost: NDArray[np.float64]
+    greedy: Bools
+    order: I32
+    found: I64
+    V: F64
+    lost: F64
 
 
 def new_appraisal(yardstick: Yardstick) -> Appraisal:
@@ -103,7 +99,7 @@ def new_appraisal(yardstick: Yardstick) -> Appraisal:
     >>> new_appraisal(yardstick).found
     array([-1])
     """
-    n_states, n_actions = yardstick.successor.shape[:2]
+    n_states, n_actions = yardstick.model.successor.shape[:2]
     return Appraisal(
         np.zeros((n_states, n_actions), dtype=np.bool_),
         np.zeros(n_states, dtype=np.int32),
@@ -134,7 +130,7 @@ class Errors(NamedTuple):
     optimal_states: float
 
 
-def empty_record(n_seeds: int, episodes: int) -> NDArray[np.float64]:
+def empty_record(n_seeds: int, episodes: int) -> F64:
     """Return the record that a learner fills: float64 of shape (seeds, episodes, columns).
 
     >>> empty_record(2, 5).shape == (2, 5, len(COLUMNS))
@@ -143,7 +139,7 @@ def empty_record(n_seeds: int, episodes: int) -> NDArray[np.float64]:
     return np.full((n_seeds, episodes, len(COLUMNS)), np.nan)
 
 
-def as_table(record: NDArray[np.float64], seeds: Sequence[int]) -> pd.DataFrame:
+def as_table(record: F64, seeds: Sequence[int]) -> pd.DataFrame:
     """Return a record as a tidy table: `seed`, `episode`, `COLUMNS`; rows never written left out.
 
     >>> as_table(empty_record(1, 5), seeds=[0]).shape == (0, 2 + len(COLUMNS))
@@ -160,7 +156,7 @@ def as_table(record: NDArray[np.float64], seeds: Sequence[int]) -> pd.DataFrame:
     return pd.DataFrame(table)
 
 
-def env_steps(record: NDArray[np.float64]) -> int:
+def env_steps(record: F64) -> int:
     """Return the environment steps of all seeds so far.
 
     >>> env_steps(empty_record(2, 5))
@@ -170,18 +166,14 @@ def env_steps(record: NDArray[np.float64]) -> int:
 
 
 @compiled
-def steps_so_far(record: NDArray[np.float64], k: int) -> int:
+def steps_so_far(record: F64, k: int) -> int:
     """Return the environment steps of one seed before episode k (from 0)."""
     return int(record[k - 1, _ENV_STEPS]) if k > 0 else 0
 
 
 @compiled
 def write_episode(
-    record: NDArray[np.float64],
-    k: int,
-    outcome: tuple[int, float, bool, int],
-    Q: NDArray[np.float64],
-    yardstick: Yardstick,
+    record: F64, k: int, outcome: tuple[int, float, bool, int], Q: F64, yardstick: Yardstick
 ) -> None:
     """Write the row of episode k (from 0) of one seed; running counts go on from the row before.
 
@@ -198,19 +190,14 @@ def write_episode(
 
 @compiled
 def write_loss(
-    record: NDArray[np.float64],
-    k: int,
-    Q: NDArray[np.float64],
-    yardstick: Yardstick,
-    gamma: float,
-    appraisal: Appraisal,
+    record: F64, k: int, Q: F64, yardstick: Yardstick, gamma: float, appraisal: Appraisal
 ) -> None:
     """Add to the row of episode k the value that the greedy policy loses."""
     record[k, _VALUE_LOST] = value_lost(Q, yardstick, gamma, appraisal)
 
 
 @compiled
-def write_evaluation(record: NDArray[np.float64], k: int, trials: NDArray[np.float64]) -> None:
+def write_evaluation(record: F64, k: int, trials: F64) -> None:
     """Add to the row of episode k the evaluation's mean return and steps.
 
     `trials` has a row (return, steps) for each of the evaluation's episodes.
@@ -220,7 +207,7 @@ def write_evaluation(record: NDArray[np.float64], k: int, trials: NDArray[np.flo
 
 
 @compiled
-def errors(Q: NDArray[np.float64], yardstick: Yardstick) -> Errors:
+def errors(Q: F64, yardstick: Yardstick) -> Errors:
     """Measure Q, float64 of shape (S, A), in one pass.
 
     Examples
@@ -257,9 +244,7 @@ def errors(Q: NDArray[np.float64], yardstick: Yardstick) -> Errors:
 
 
 @compiled
-def value_lost(
-    Q: NDArray[np.float64], yardstick: Yardstick, gamma: float, appraisal: Appraisal
-) -> float:
+def value_lost(Q: F64, yardstick: Yardstick, gamma: float, appraisal: Appraisal) -> float:
     """Return v*(s_0) - v_pi(s_0) for the greedy policy pi, which draws among ties uniformly.
 
     Averaged over the start states. NaN if Q* or the model is not known, or if the values do not
@@ -290,10 +275,10 @@ def value_lost(
     >>> round(value_lost(np.zeros((112, 4)), yardstick, 0.9, appraisal), 3)
     0.523
     """
-    if len(yardstick.start_state) == 0 or len(yardstick.Q_star) == 0:
+    if len(yardstick.model.start_state) == 0 or len(yardstick.Q_star) == 0:
         return math.nan
     if not _as_before(Q, appraisal):
-        _follow(Q, yardstick, appraisal)
+        _follow(Q, yardstick.model, appraisal)
         appraisal.lost[0] = _loss(yardstick, gamma, appraisal)
         if not math.isfinite(appraisal.lost[0]):
             appraisal.V[:] = 0.0
@@ -301,7 +286,7 @@ def value_lost(
 
 
 @compiled
-def _as_before(Q: NDArray[np.float64], appraisal: Appraisal) -> bool:
+def _as_before(Q: F64, appraisal: Appraisal) -> bool:
     """Say whether the greedy policy takes the same actions in all states it can get to."""
     for i in range(appraisal.found[0]):
         s = appraisal.order[i]
@@ -313,12 +298,12 @@ def _as_before(Q: NDArray[np.float64], appraisal: Appraisal) -> bool:
 
 
 @compiled
-def _follow(Q: NDArray[np.float64], yardstick: Yardstick, appraisal: Appraisal) -> None:
+def _follow(Q: F64, model: Model, appraisal: Appraisal) -> None:
     """Note which non-terminal states the greedy policy can get to, and what it does there."""
-    known = np.zeros(len(yardstick.terminal), dtype=np.bool_)
+    known = np.zeros(len(model.terminal), dtype=np.bool_)
     order, n_found, n_searched = appraisal.order, 0, 0
-    for s in yardstick.start_state:
-        if not yardstick.terminal[s]:
+    for s in model.start_state:
+        if not model.terminal[s]:
             known[s] = True
             order[n_found] = s
             n_found += 1
@@ -328,10 +313,10 @@ def _follow(Q: NDArray[np.float64], yardstick: Yardstick, appraisal: Appraisal) 
         best = np.max(Q[s])
         for a in range(Q.shape[1]):
             appraisal.greedy[s, a] = Q[s, a] == best
-            for k in range(yardstick.successor.shape[2] if Q[s, a] == best else 0):
-                s_next = yardstick.successor[s, a, k]
-                possible = yardstick.probability[s, a, k] > 0.0
-                if possible and not known[s_next] and not yardstick.terminal[s_next]:
+            for k in range(model.successor.shape[2] if Q[s, a] == best else 0):
+                s_next = model.successor[s, a, k]
+                possible = model.probability[s, a, k] > 0.0
+                if possible and not known[s_next] and not model.terminal[s_next]:
                     known[s_next] = True
                     order[n_found] = s_next
                     n_found += 1
@@ -341,37 +326,31 @@ def _follow(Q: NDArray[np.float64], yardstick: Yardstick, appraisal: Appraisal) 
 @compiled
 def _loss(yardstick: Yardstick, gamma: float, appraisal: Appraisal) -> float:
     """Value the policy by sweeps, in place, and compare it with the optimum; NaN: no values."""
-    order, V, start = appraisal.order, appraisal.V, yardstick.start_state
+    order, V, model = appraisal.order, appraisal.V, yardstick.model
     for _ in range(MAX_SWEEPS):
         change = 0.0
         for i in range(appraisal.found[0] - 1, -1, -1):  # what was found last is nearest to the end
             s = order[i]
-            v = _backup(V, appraisal.greedy, yardstick, gamma, s)
+            v = _backup(V, appraisal.greedy, model, gamma, s)
             change = max(change, abs(v - V[s]))
             V[s] = v
         if change <= TOLERANCE:
             lost = 0.0
-            for i in range(len(start)):
-                best = np.max(yardstick.Q_star[start[i]])
-                lost += yardstick.start_probability[i] * (best - V[start[i]])
+            for i in range(len(model.start_state)):
+                s = model.start_state[i]
+                lost += model.start_probability[i] * (np.max(yardstick.Q_star[s]) - V[s])
             return lost
     return math.nan
 
 
 @compiled
-def _backup(
-    V: NDArray[np.float64],
-    greedy: NDArray[np.bool_],
-    yardstick: Yardstick,
-    gamma: float,
-    s: int,
-) -> float:
+def _backup(V: F64, greedy: Bools, model: Model, gamma: float, s: int) -> float:
     """Return sum_a pi(a | s) sum_k p_k (r_k + gamma V(s'_k)) for the greedy policy pi."""
     total, ties = 0.0, 0
     for a in range(greedy.shape[1]):
         if greedy[s, a]:
             ties += 1
-            for k in range(yardstick.successor.shape[2]):
-                after = yardstick.reward[s, a, k] + gamma * V[yardstick.successor[s, a, k]]
-                total += yardstick.probability[s, a, k] * after
+            for k in range(model.successor.shape[2]):
+                after = model.reward[s, a, k] + gamma * V[model.successor[s, a, k]]
+                total += model.probability[s, a, k] * after
     return total / ties

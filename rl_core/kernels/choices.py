@@ -5,9 +5,7 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rl_core.kernels.arrays import F64
 from rl_core.kernels.compiled import compiled
 
 EPSILON_GREEDY, SOFTMAX, UNNORMALISED_SOFTMAX = range(3)
@@ -18,7 +16,7 @@ VALUE, START, END, STEPS, SHARE, AIM = range(6)
 
 
 @compiled
-def choose(kind: int, parameter: float, q: NDArray[np.float64], u: float, v: float) -> int:
+def choose(kind: int, parameter: float, q: F64, u: float, v: float) -> int:
     """Return the action that a rule takes; a pure function of the values and two uniforms.
 
     Parameters
@@ -39,6 +37,7 @@ def choose(kind: int, parameter: float, q: NDArray[np.float64], u: float, v: flo
 
     Examples
     --------
+    >>> import numpy as np
     >>> choose(EPSILON_GREEDY, 0.1, np.array([0.0, 2.0, 1.0]), u=0.5, v=0.9)
     1
     """
@@ -52,7 +51,7 @@ def choose(kind: int, parameter: float, q: NDArray[np.float64], u: float, v: flo
 
 
 @compiled
-def greedy_action(q: NDArray[np.float64], v: float) -> int:
+def greedy_action(q: F64, v: float) -> int:
     """Draw one of the actions with the largest value, uniformly."""
     best, ties = q[0], 1
     for a in range(1, len(q)):
@@ -70,7 +69,7 @@ def greedy_action(q: NDArray[np.float64], v: float) -> int:
 
 
 @compiled
-def _softmax_action(q: NDArray[np.float64], temperature: float, u: float) -> int:
+def _softmax_action(q: F64, temperature: float, u: float) -> int:
     """Draw by the cumulative weights exp((q - max q) / T), which cannot overflow."""
     best = q[0]
     for a in range(1, len(q)):
@@ -87,7 +86,7 @@ def _softmax_action(q: NDArray[np.float64], temperature: float, u: float) -> int
 
 
 @compiled
-def _unnormalised_softmax_action(q: NDArray[np.float64], u: float) -> int:
+def _unnormalised_softmax_action(q: F64, u: float) -> int:
     """Draw by the cumulative weights exp(q) / sum(q), whatever they sum to."""
     total = 0.0
     for a in range(len(q)):
@@ -107,7 +106,7 @@ def step_size(initial: float, exponent: float, n: int) -> float:
 
 
 @compiled
-def after_step(state: NDArray[np.float64], t: int) -> None:
+def after_step(state: F64, t: int) -> None:
     """Tell a schedule that t environment steps are over: `Linear` goes on.
 
     Parameters
@@ -119,6 +118,7 @@ def after_step(state: NDArray[np.float64], t: int) -> None:
 
     Examples
     --------
+    >>> import numpy as np
     >>> state = np.array([1.0, 1.0, 0.0, 4, 0.0, 1.0])  # from 1 to 0 in four steps
     >>> after_step(state, 3)
     >>> state[VALUE]
@@ -130,7 +130,7 @@ def after_step(state: NDArray[np.float64], t: int) -> None:
 
 
 @compiled
-def after_goal(state: NDArray[np.float64]) -> None:
+def after_goal(state: F64) -> None:
     """Tell a schedule that an episode has reached its end by itself: `HalfWay` goes on.
 
     Parameters
@@ -140,6 +140,7 @@ def after_goal(state: NDArray[np.float64]) -> None:
 
     Examples
     --------
+    >>> import numpy as np
     >>> state = np.array([1.0, 1.0, 0.0, 0, 0.5, 1.0])  # half-way from 1 to 0
     >>> after_goal(state)
     >>> state[VALUE]
@@ -150,7 +151,7 @@ def after_goal(state: NDArray[np.float64]) -> None:
 
 
 @compiled
-def after_copy(state: NDArray[np.float64]) -> None:
+def after_copy(state: F64) -> None:
     """Tell a schedule that the target network was copied: `HalfWay` goes to its mid-point.
 
     Parameters
@@ -160,6 +161,7 @@ def after_copy(state: NDArray[np.float64]) -> None:
 
     Examples
     --------
+    >>> import numpy as np
     >>> state = np.array([1.0, 1.0, 0.0, 0, 0.5, 1.0])  # half-way from 1 to 0
     >>> after_goal(state)
     >>> after_copy(state)  # half-way from 0.5 to the mid-point 0.25

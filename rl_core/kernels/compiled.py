@@ -9,6 +9,7 @@ from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 from numba.core import caching
+from numba.extending import overload
 
 from rl_core import sources
 
@@ -58,6 +59,21 @@ def compiled(function: Callable[_Arguments, _Result]) -> Callable[_Arguments, _R
         with contextlib.suppress(RuntimeError, ValueError, OSError):
             kernel._cache = _KernelCache(function, code)
     return cast(Callable[_Arguments, _Result], kernel)
+
+
+def compiled_as(function: Callable[..., Any], kernel: Callable[..., Any]) -> None:
+    """Let compiled code that calls `function` call `kernel`, with the same arguments.
+
+    Examples
+    --------
+    >>> from rl_core.kernels.compiled import compiled, compiled_as
+    >>> def name(x):
+    ...     return f"plain {x}"
+    >>> compiled_as(name, compiled(lambda x: x + 1))
+    >>> compiled(lambda x: name(x))(1), name(1)
+    (2, 'plain 1')
+    """
+    overload(function, strict=False)(lambda *arguments: lambda *arguments: kernel(*arguments))
 
 
 def switches() -> dict[str, str]:

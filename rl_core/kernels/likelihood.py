@@ -12,9 +12,9 @@ and for a Gaussian log sigma_k, one a component.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rl_core.kernels import networks
+from rl_core.kernels.arrays import F32, F64, I64
 from rl_core.kernels.compiled import compiled
 
 
@@ -35,14 +35,14 @@ class Policy(NamedTuple):
         Components of an action: 1 for a categorical policy, whose action is an index.
     """
 
-    sizes: NDArray[np.int64]
+    sizes: I64
     gaussian: bool
     weighted_features: bool
     constant_feature: bool
     action_width: int
 
 
-def unpack(policy: Policy, parameters: NDArray[np.float32]) -> dict[str, NDArray[np.float32]]:
+def unpack(policy: Policy, parameters: F32) -> dict[str, F32]:
     """Name the parts of parameter vectors of shape (..., P): views.
 
     Returns
@@ -58,9 +58,7 @@ def unpack(policy: Policy, parameters: NDArray[np.float32]) -> dict[str, NDArray
 
 
 @compiled
-def _write_features(
-    policy: Policy, observation: NDArray[np.float32], features: NDArray[np.float32]
-) -> None:
+def _write_features(policy: Policy, observation: F32, features: F32) -> None:
     """Write the network's inputs for one observation."""
     for i in range(observation.size):
         features[i] = observation[i]
@@ -69,7 +67,7 @@ def _write_features(
 
 
 @compiled
-def _gaussian_mean(policy: Policy, units: NDArray[np.float32], k: int) -> np.float32:
+def _gaussian_mean(policy: Policy, units: F32, k: int) -> np.float32:
     """Mean of component k of the action, from the units of a network that saw one state."""
     n_features = policy.sizes[0]
     outputs = units[units.size - policy.sizes[-1] :]
@@ -82,7 +80,7 @@ def _gaussian_mean(policy: Policy, units: NDArray[np.float32], k: int) -> np.flo
 
 
 @compiled
-def _choose_categorical(scores: NDArray[np.float32], uniform: float) -> int:
+def _choose_categorical(scores: F32, uniform: float) -> int:
     """First k whose cumulative probability exceeds `uniform`; overwrites the scores."""
     highest = scores.max()
     total = 0.0
@@ -112,23 +110,18 @@ class Actor(NamedTuple):
     """
 
     policy: Policy
-    parameters: NDArray[np.float32]
+    parameters: F32
     epsilon: float
-    units: NDArray[np.float32]
+    units: F32
 
 
-def make_actor(policy: Policy, parameters: NDArray[np.float32], epsilon: float = 0.0) -> Actor:
+def make_actor(policy: Policy, parameters: F32, epsilon: float = 0.0) -> Actor:
     """Return an actor that follows `parameters`, also as they change."""
     return Actor(policy, parameters, epsilon, np.empty(int(policy.sizes.sum()), np.float32))
 
 
 @compiled
-def choose_action(
-    actor: Actor,
-    observation: NDArray[np.float32],
-    noise: NDArray[np.float64],
-    action: NDArray[np.float32],
-) -> None:
+def choose_action(actor: Actor, observation: F32, noise: F64, action: F32) -> None:
     """Turn noise into an action drawn from pi(.|s), and write it to `action`.
 
     Parameters
@@ -160,13 +153,7 @@ def choose_action(
 
 
 @compiled
-def draw_action(
-    policy: Policy,
-    log_sigma: NDArray[np.float32],
-    units: NDArray[np.float32],
-    noise: NDArray[np.float64],
-    action: NDArray[np.float32],
-) -> None:
+def draw_action(policy: Policy, log_sigma: F32, units: F32, noise: F64, action: F32) -> None:
     """Turn noise into an action, given the network's outputs.
 
     Parameters
@@ -188,11 +175,7 @@ def draw_action(
 
 @compiled
 def _categorical_deltas(
-    policy: Policy,
-    actions: NDArray[np.float32],
-    weights: NDArray[np.float32],
-    units: NDArray[np.float32],
-    deltas: NDArray[np.float32],
+    policy: Policy, actions: F32, weights: F32, units: F32, deltas: F32
 ) -> None:
     """Derivatives of -w log pi(a|s) by the outputs: w (pi(.|s) - onehot(a))."""
     n_actions = policy.sizes[-1]
@@ -213,12 +196,12 @@ def _categorical_deltas(
 @compiled
 def _gaussian_deltas(
     policy: Policy,
-    parameters: NDArray[np.float32],
-    actions: NDArray[np.float32],
-    weights: NDArray[np.float32],
-    units: NDArray[np.float32],
-    deltas: NDArray[np.float32],
-    gradient: NDArray[np.float32],
+    parameters: F32,
+    actions: F32,
+    weights: F32,
+    units: F32,
+    deltas: F32,
+    gradient: F32,
 ) -> None:
     """Derivatives of -w log pi(a|s) by the outputs and by log sigma.
 
@@ -244,13 +227,13 @@ def _gaussian_deltas(
 @compiled
 def likelihood_gradient(
     policy: Policy,
-    parameters: NDArray[np.float32],
-    observations: NDArray[np.float32],
-    actions: NDArray[np.float32],
-    weights: NDArray[np.float32],
-    units: NDArray[np.float32],
-    deltas: NDArray[np.float32],
-    gradient: NDArray[np.float32],
+    parameters: F32,
+    observations: F32,
+    actions: F32,
+    weights: F32,
+    units: F32,
+    deltas: F32,
+    gradient: F32,
 ) -> None:
     """Gradient of -sum_k w_k log pi(a_k|s_k) by all parameters.
 
@@ -316,21 +299,17 @@ class Learner(NamedTuple):
     """
 
     policy: Policy
-    parameters: NDArray[np.float32]
-    trainable: NDArray[np.float32]
-    first: NDArray[np.float32]
-    second: NDArray[np.float32]
-    updates: NDArray[np.int64]
+    parameters: F32
+    trainable: F32
+    first: F32
+    second: F32
+    updates: I64
     batch_size: int
     learning_rate: float
 
 
 def make_learner(
-    policy: Policy,
-    parameters: NDArray[np.float32],
-    trainable: NDArray[np.float32],
-    batch_size: int,
-    learning_rate: float,
+    policy: Policy, parameters: F32, trainable: F32, batch_size: int, learning_rate: float
 ) -> Learner:
     """Return a learner that has not learned yet; it will change `parameters`."""
     moments = np.zeros_like(parameters), np.zeros_like(parameters)
@@ -339,13 +318,7 @@ def make_learner(
 
 
 @compiled
-def learn(
-    learner: Learner,
-    observations: NDArray[np.float32],
-    actions: NDArray[np.float32],
-    returns: NDArray[np.float64],
-    orders: NDArray[np.int64],
-) -> None:
+def learn(learner: Learner, observations: F32, actions: F32, returns: F64, orders: I64) -> None:
     """Climb the likelihood of an episode's actions, weighted by the returns: a step a minibatch.
 
     The compiled form of `rl_core.reinforce.TorchLearner.learn`, where the equation stands.
@@ -368,23 +341,11 @@ def learn(
     for order in orders:
         for start in range(0, returns.size, largest):
             batch = order[start : start + largest]
-            likelihood_gradient(
-                policy,
-                parameters,
-                observations[batch],
-                actions[batch],
-                (returns[batch] / batch.size).astype(np.float32),
-                units,
-                deltas,
-                gradient,
-            )
+            examples = observations[batch], actions[batch]
+            weights = (returns[batch] / batch.size).astype(np.float32)
+            likelihood_gradient(policy, parameters, *examples, weights, units, deltas, gradient)
             gradient *= learner.trainable
             learner.updates[0] += 1
-            networks.adam_step(
-                parameters,
-                gradient,
-                learner.first,
-                learner.second,
-                learner.updates[0],
-                learner.learning_rate,
-            )
+            moments = learner.first, learner.second
+            count, rate = learner.updates[0], learner.learning_rate
+            networks.adam_step(parameters, gradient, *moments, count, rate)

@@ -21,6 +21,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from rl_core.kernels.arrays import F32, I64
 from rl_core.kernels.compiled import compiled
 
 LANES = 32
@@ -38,7 +39,7 @@ def count_parameters(sizes: Sequence[int]) -> int:
     return sum((n_in + 1) * n_out for n_in, n_out in pairwise(sizes))
 
 
-def xavier_uniform(sizes: Sequence[int], rng: np.random.Generator) -> NDArray[np.float32]:
+def xavier_uniform(sizes: Sequence[int], rng: np.random.Generator) -> F32:
     """Draw the initial parameters of one network.
 
     Weights of a layer with n_in inputs and n_out outputs are uniform on (-a, a) with
@@ -73,7 +74,7 @@ def xavier_uniform(sizes: Sequence[int], rng: np.random.Generator) -> NDArray[np
     return np.concatenate(parts).astype(np.float32)
 
 
-def unpack(sizes: Sequence[int], parameters: NDArray[np.float32]) -> dict[str, NDArray[np.float32]]:
+def unpack(sizes: Sequence[int], parameters: F32) -> dict[str, F32]:
     """Name the weights and biases inside parameter vectors.
 
     Parameters
@@ -104,7 +105,7 @@ def unpack(sizes: Sequence[int], parameters: NDArray[np.float32]) -> dict[str, N
     return layers
 
 
-def pack(layers: Mapping[str, NDArray[np.float32]]) -> tuple[tuple[int, ...], NDArray[np.float32]]:
+def pack(layers: Mapping[str, F32]) -> tuple[tuple[int, ...], F32]:
     """Undo `unpack` for one network: its sizes and parameters. Missing biases are zero.
 
     Raises
@@ -119,7 +120,7 @@ def pack(layers: Mapping[str, NDArray[np.float32]]) -> tuple[tuple[int, ...], ND
     >>> sizes, parameters.size
     ((2, 3), 9)
     """
-    weights: list[NDArray[np.float32]] = []
+    weights: list[F32] = []
     while (name := f"layer{len(weights)}.weight") in layers:
         weights.append(np.asarray(layers[name]))
     if not weights or any(weight.ndim != 2 for weight in weights):
@@ -138,7 +139,7 @@ def pack(layers: Mapping[str, NDArray[np.float32]]) -> tuple[tuple[int, ...], ND
     return sizes, parameters
 
 
-def trainable_mask(sizes: Sequence[int], biases: bool) -> NDArray[np.float32]:
+def trainable_mask(sizes: Sequence[int], biases: bool) -> F32:
     """Ones where a parameter learns, zeros where not: multiply a gradient by it.
 
     Examples
@@ -154,9 +155,7 @@ def trainable_mask(sizes: Sequence[int], biases: bool) -> NDArray[np.float32]:
     return mask
 
 
-def output(
-    sizes: Sequence[int], parameters: NDArray[np.float32], inputs: NDArray[np.floating]
-) -> NDArray[np.float32]:
+def output(sizes: Sequence[int], parameters: F32, inputs: NDArray[np.floating]) -> F32:
     """Outputs of one network for many inputs.
 
     Parameters
@@ -188,9 +187,7 @@ def padded(n: int) -> int:
 
 
 @compiled
-def forward_one(
-    sizes: NDArray[np.int64], parameters: NDArray[np.float32], units: NDArray[np.float32]
-) -> None:
+def forward_one(sizes: I64, parameters: F32, units: F32) -> None:
     """Compute all units for one input; the bits are those of `forward`.
 
     Parameters
@@ -218,9 +215,7 @@ def forward_one(
 
 
 @compiled
-def _add_rows(
-    total: NDArray[np.float32], rows: NDArray[np.float32], weights: NDArray[np.float32], n: int
-) -> None:
+def _add_rows(total: F32, rows: F32, weights: F32, n: int) -> None:
     """Add weighted rows to a total one after the other, over n columns: total += w_i x_i.
 
     Four rows are taken for one reading and writing of the total; the order of the sums is kept.
@@ -240,12 +235,7 @@ def _add_rows(
 
 
 @compiled
-def forward(
-    sizes: NDArray[np.int64],
-    parameters: NDArray[np.float32],
-    units: NDArray[np.float32],
-    n: int,
-) -> None:
+def forward(sizes: I64, parameters: F32, units: F32, n: int) -> None:
     """Compute all units for a batch of inputs.
 
     Parameters
@@ -277,9 +267,7 @@ def forward(
 
 
 @compiled
-def _dot(
-    x: NDArray[np.float32], y: NDArray[np.float32], sums: NDArray[np.float32], n: int
-) -> np.float32:
+def _dot(x: F32, y: F32, sums: F32, n: int) -> np.float32:
     """Inner product of n entries, n a multiple of `LANES`.
 
     Eight far apart products are added at a time and four sums kept, in an order that is the same
@@ -304,14 +292,7 @@ def _dot(
 
 
 @compiled
-def backward(
-    sizes: NDArray[np.int64],
-    parameters: NDArray[np.float32],
-    units: NDArray[np.float32],
-    deltas: NDArray[np.float32],
-    gradient: NDArray[np.float32],
-    n: int,
-) -> None:
+def backward(sizes: I64, parameters: F32, units: F32, deltas: F32, gradient: F32, n: int) -> None:
     """Backpropagate: the gradient of a loss that is a sum over the samples of a batch.
 
     Parameters
@@ -356,12 +337,7 @@ def backward(
 
 @compiled
 def adam_step(
-    parameters: NDArray[np.float32],
-    gradient: NDArray[np.float32],
-    first: NDArray[np.float32],
-    second: NDArray[np.float32],
-    count: int,
-    learning_rate: float,
+    parameters: F32, gradient: F32, first: F32, second: F32, count: int, learning_rate: float
 ) -> None:
     """Take one descent step of Adam on one network, in place.
 
@@ -405,12 +381,7 @@ def adam_step(
 
 
 @compiled
-def rmsprop_step(
-    parameters: NDArray[np.float32],
-    gradient: NDArray[np.float32],
-    mean_square: NDArray[np.float32],
-    learning_rate: float,
-) -> None:
+def rmsprop_step(parameters: F32, gradient: F32, mean_square: F32, learning_rate: float) -> None:
     """Take one descent step of RMSProp on one network, in place.
 
         v <- decay v + (1 - decay) g^2,    theta <- theta - alpha g / sqrt(v + epsilon)

@@ -22,11 +22,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.extending import overload
-from numpy.typing import NDArray
 
 from rl_core.kernels import choices, networks
-from rl_core.kernels.compiled import compiled
+from rl_core.kernels.arrays import F32, F64, I64
+from rl_core.kernels.compiled import compiled, compiled_as
 from rl_core.kernels.replay import Memory
 
 STEPS, UPDATES, COPIES, KEPT, ACTION = range(5)
@@ -73,30 +72,25 @@ class Learner(NamedTuple):
     settings : Settings
     """
 
-    sizes: NDArray[np.int64]
-    parameters: NDArray[np.float32]
-    fixed: NDArray[np.float32]
-    trainable: NDArray[np.float32]
-    first: NDArray[np.float32]
-    second: NDArray[np.float32]
-    counts: NDArray[np.int64]
-    epsilon: NDArray[np.float64]
-    units: NDArray[np.float32]
-    deltas: NDArray[np.float32]
-    gradient: NDArray[np.float32]
-    slots: NDArray[np.int64]
-    stale: NDArray[np.int64]
-    one: NDArray[np.float32]
+    sizes: I64
+    parameters: F32
+    fixed: F32
+    trainable: F32
+    first: F32
+    second: F32
+    counts: I64
+    epsilon: F64
+    units: F32
+    deltas: F32
+    gradient: F32
+    slots: I64
+    stale: I64
+    one: F32
     settings: Settings
 
 
 def make_learner(
-    sizes: tuple[int, ...],
-    parameters: NDArray[np.float32],
-    settings: Settings,
-    epsilon: NDArray[np.float64],
-    *,
-    biases: bool,
+    sizes: tuple[int, ...], parameters: F32, settings: Settings, epsilon: F64, *, biases: bool
 ) -> Learner:
     """Make the learner of one seed; it changes `parameters` in place.
 
@@ -142,7 +136,7 @@ def make_learner(
     )
 
 
-def q_values(learner: Any, observation: NDArray[np.float32]) -> NDArray[np.float64]:
+def q_values(learner: Any, observation: F32) -> F64:
     """Q(s, .; theta) of one state, float64 of shape (A,); of any learner, compiled or not.
 
     Examples
@@ -155,12 +149,12 @@ def q_values(learner: Any, observation: NDArray[np.float32]) -> NDArray[np.float
     """
     if isinstance(learner, Learner):
         return _q_values(learner, observation)
-    values: NDArray[np.float64] = learner.q_values(observation)
+    values: F64 = learner.q_values(observation)
     return values
 
 
 @compiled
-def _q_values(learner: Learner, observation: NDArray[np.float32]) -> NDArray[np.float64]:
+def _q_values(learner: Learner, observation: F32) -> F64:
     units = learner.one
     for i in range(observation.size):
         units[i] = observation[i]
@@ -303,19 +297,14 @@ def _update(learner: Learner, memory: Memory) -> bool:
     if not math.isfinite(loss_gradient(learner, memory)):
         return False
     counts, gradient, settings = learner.counts, learner.gradient, learner.settings
+    rate = settings.learning_rate
     gradient *= learner.trainable
     counts[UPDATES] += 1
     if settings.adam:
-        networks.adam_step(
-            learner.parameters,
-            gradient,
-            learner.first,
-            learner.second,
-            counts[UPDATES],
-            settings.learning_rate,
-        )
+        moments = learner.first, learner.second
+        networks.adam_step(learner.parameters, gradient, *moments, counts[UPDATES], rate)
     else:
-        networks.rmsprop_step(learner.parameters, gradient, learner.second, settings.learning_rate)
+        networks.rmsprop_step(learner.parameters, gradient, learner.second, rate)
     if counts[UPDATES] % settings.copy_every == 0:
         learner.fixed[:] = learner.parameters
         counts[COPIES] += 1
@@ -323,8 +312,5 @@ def _update(learner: Learner, memory: Memory) -> bool:
     return True
 
 
-# What the two mean in compiled code.
-overload(q_values)(
-    lambda learner, observation: lambda learner, observation: _q_values(learner, observation)
-)
-overload(update)(lambda learner, memory: lambda learner, memory: _update(learner, memory))
+compiled_as(q_values, _q_values)
+compiled_as(update, _update)

@@ -14,8 +14,8 @@ and teaching.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rl_core.kernels.arrays import F32, F64, I64, Bools
 from rl_core.kernels.compiled import compiled
 
 NEVER = -1
@@ -42,14 +42,14 @@ class Memory(NamedTuple):
         Transitions stored so far, the overwritten ones included.
     """
 
-    observations: NDArray[np.float32]
-    next_observations: NDArray[np.float32]
-    actions: NDArray[np.int64]
-    rewards: NDArray[np.float64]
-    ends: NDArray[np.bool_]
-    next_values: NDArray[np.float32]
-    stamps: NDArray[np.int64]
-    stored: NDArray[np.int64]
+    observations: F32
+    next_observations: F32
+    actions: I64
+    rewards: F64
+    ends: Bools
+    next_values: F32
+    stamps: I64
+    stored: I64
 
 
 def make_memory(capacity: int, n_observations: int) -> Memory:
@@ -97,12 +97,7 @@ def held(memory: Memory) -> int:
 
 @compiled
 def store(
-    memory: Memory,
-    observation: NDArray[np.float32],
-    action: int,
-    reward: float,
-    next_observation: NDArray[np.float32],
-    end: bool,
+    memory: Memory, observation: F32, action: int, reward: float, next_observation: F32, end: bool
 ) -> None:
     """Store a transition in the place of the oldest.
 
@@ -137,7 +132,7 @@ def store(
 
 
 @compiled
-def sample(memory: Memory, uniforms: NDArray[np.float64], slots: NDArray[np.int64]) -> None:
+def sample(memory: Memory, uniforms: F64, slots: I64) -> None:
     """Turn uniforms in [0, 1) into slots, one each.
 
     Parameters

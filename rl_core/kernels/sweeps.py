@@ -16,8 +16,8 @@ import heapq
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rl_core.kernels.arrays import F64, I32, I64, Bools, Ints
 from rl_core.kernels.compiled import compiled
 
 TIE = 1e-10
@@ -44,12 +44,12 @@ class Transitions(NamedTuple):
         `own_rows * s`.
     """
 
-    successor: NDArray[np.int32]
-    probability: NDArray[np.float64]
+    successor: I32
+    probability: F64
     own_rows: int
 
 
-def transitions(successor: NDArray[np.int32], probability: NDArray[np.float64]) -> Transitions:
+def transitions(successor: I32, probability: F64) -> Transitions:
     """Return them as the kernels take them: probabilities that all states share are given once."""
     shared = probability.strides[0] == 0 and len(probability) > 1
     rows = np.ascontiguousarray(probability[:1] if shared else probability)
@@ -58,11 +58,7 @@ def transitions(successor: NDArray[np.int32], probability: NDArray[np.float64]) 
 
 @compiled
 def lookahead(
-    transitions: Transitions,
-    reward: NDArray[np.float64],
-    gamma: float,
-    V: NDArray[np.float64],
-    Q: NDArray[np.float64],
+    transitions: Transitions, reward: F64, gamma: float, V: F64, Q: F64
 ) -> tuple[float, float]:
     """Write Q(s, a) = Σ_k p_k (r_k + γ V(s'_k)) over Q; return the change, largest and squared."""
     successor, probability, own_rows = transitions
@@ -83,9 +79,7 @@ def lookahead(
 
 
 @compiled
-def greedy(
-    Q: NDArray[np.float64], V: NDArray[np.float64], policy: NDArray[np.signedinteger]
-) -> tuple[float, float, int]:
+def greedy(Q: F64, V: F64, policy: Ints) -> tuple[float, float, int]:
     """Write V(s) = max_a Q(s, a) and the lowest action that attains it (ties: `TIE`).
 
     Returns the largest change and the sum of squared changes of V, and the number of states whose
@@ -111,78 +105,40 @@ def greedy(
 
 
 @compiled
-def expected_rewards(
-    transitions: Transitions,
-    reward: NDArray[np.float64],
-    order: NDArray[np.int32],
-    r: NDArray[np.float64],
-) -> float:
-    """Write r(i, a) = Σ_k p_k r_k of state order[i]; return the largest |r_k|."""
+def expected_rewards(transitions: Transitions, reward: F64, r: F64) -> float:
+    """Write r(s, a) = Σ_k p_k r_k; return the largest |r_k|."""
     _, probability, own_rows = transitions
     n_states, n_actions, n_successors = reward.shape
     largest = 0.0
-    for i in range(n_states):
-        s = order[i]
+    for s in range(n_states):
         for a in range(n_actions):
             mean = 0.0
             for k in range(n_successors):
                 largest = max(largest, abs(reward[s, a, k]))
                 mean += probability[own_rows * s, a, k] * reward[s, a, k]
-            r[i, a] = mean
+            r[s, a] = mean
     return largest
 
 
 @compiled
-def _main_slot(probability: NDArray[np.float64], row: int, a: int) -> int:
-    """Return the slot of the likeliest successor (of several, the first)."""
-    main = 0
-    for k in range(1, probability.shape[2]):
-        if probability[row, a, k] > probability[row, a, main]:
-            main = k
-    return main
+def _predecessors(leads_to: I32) -> tuple[I64, I32]:
+    """List the pairs s A + a by the state they lead to: those of s' at first[s']..first[s' + 1].
 
-
-@compiled
-def count_predecessors(transitions: Transitions, first: NDArray[np.int64]) -> None:
-    """Write where each state's list of predecessors will begin: that of s at first[s + 1].
-
-    Filling the list moves first[s + 1] to its end, so that afterwards it is first[s]..first[s + 1].
+    A counting sort, in which first[s' + 1] moves from the beginning of a list to its end.
     """
-    successor, probability, own_rows = transitions
-    n_states, n_actions, _ = successor.shape
-    first[:] = 0
-    for s in range(n_states):
-        for a in range(n_actions):
-            following = successor[s, a, _main_slot(probability, own_rows * s, a)]
-            if following != s:
-                first[following + 2] += 1
-    for s in range(n_states):
-        first[s + 2] += first[s + 1]
+    first = np.zeros(len(leads_to) + 2, np.int64)
+    for following in leads_to.flat:
+        first[following + 2] += 1
+    first = np.cumsum(first)
+    pairs = np.empty(leads_to.size, np.int32)
+    for pair, following in enumerate(leads_to.flat):
+        pairs[first[following + 1]] = pair
+        first[following + 1] += 1
+    return first, pairs
 
 
 @compiled
-def link_predecessors(
-    transitions: Transitions,
-    first: NDArray[np.int64],
-    predecessor: NDArray[np.int32],
-    action: NDArray[np.signedinteger],
-) -> None:
-    """Fill the lists: for every state, the other states and actions that most likely lead to it."""
-    successor, probability, own_rows = transitions
-    n_states, n_actions, _ = successor.shape
-    for s in range(n_states):
-        for a in range(n_actions):
-            following = successor[s, a, _main_slot(probability, own_rows * s, a)]
-            if following != s:
-                j = first[following + 1]
-                predecessor[j], action[j] = s, a
-                first[following + 1] = j + 1
-
-
-@compiled
-def _sources(
-    r: NDArray[np.float64], terminal: NDArray[np.bool_], V: NDArray[np.float64]
-) -> list[tuple[float, np.int32]]:
+def _sources(r: F64, terminal: Bools, V: F64) -> list[tuple[float, np.int32]]:
     """Give states that need no successor to have a value one; return (-value, state) as a heap.
 
     Terminal states are worth 0; a state with a positive reward at hand at least that reward. The
@@ -203,29 +159,19 @@ def _sources(
 
 @compiled
 def best_first(
-    transitions: Transitions,
-    r: NDArray[np.float64],
-    terminal: NDArray[np.bool_],
-    gamma: float,
-    first: NDArray[np.int64],
-    predecessor: NDArray[np.int32],
-    action: NDArray[np.signedinteger],
-    V: NDArray[np.float64],
-    order: NDArray[np.int32],
-    queue: NDArray[np.int32],
-    settled: NDArray[np.bool_],
+    leads_to: I32, p: F64, r: F64, terminal: Bools, gamma: float, V: F64, order: I32
 ) -> None:
     """Estimate V and write the states by falling estimate into `order` (Dijkstra's search).
 
     The estimate is exact in a model where each action either leads to its likeliest successor s',
     with probability p, or leaves the agent where it is: V(s) = max_a (r(s, a) + γ p V(s')) /
-    (1 - γ (1 - p)). Where rewards are rare, values are found in falling order, so a plain queue
-    holds nearly all of the waiting states; those out of order go to a heap. States from which no
-    source is found keep the estimate 0 and come last.
+    (1 - γ (1 - p)). p has a row for every state, or one for all. Where rewards are rare, values are
+    found in falling order, so a plain queue holds nearly all of the waiting states; those out of
+    order go to a heap. States from which no source is found keep the estimate 0 and come last.
     """
-    _, probability, own_rows = transitions
-    n_states = len(r)
-    settled[:] = False
+    n_states, n_actions = r.shape
+    first, pairs = _predecessors(leads_to)
+    queue, settled = np.empty(n_states, np.int32), np.zeros(n_states, np.bool_)
     heap = _sources(r, terminal, V)
     head, tail, n_settled = 0, 0, 0
     while head < tail or len(heap) > 0:
@@ -240,11 +186,11 @@ def best_first(
         order[n_settled] = s
         n_settled += 1
         for j in range(first[s], first[s + 1]):
-            before, a = predecessor[j], action[j]
+            before, a = np.int32(pairs[j] // n_actions), pairs[j] % n_actions
             if settled[before]:
                 continue
-            p = probability[own_rows * before, a, _main_slot(probability, own_rows * before, a)]
-            value = (r[before, a] + gamma * p * V[s]) / (1.0 - gamma * (1.0 - p))
+            chance = p[before if len(p) > 1 else 0, a]
+            value = (r[before, a] + gamma * chance * V[s]) / (1.0 - gamma * (1.0 - chance))
             if value > V[before]:
                 V[before] = value
                 if tail < n_states and (head == tail or value <= V[queue[tail - 1]]):
@@ -260,68 +206,43 @@ def best_first(
 
 
 @compiled
-def rearrange(
-    transitions: Transitions,
-    order: NDArray[np.int32],
-    rank: NDArray[np.int32],
-    ordered: Transitions,
-) -> None:
-    """Write the transitions with the states renumbered: order[i] becomes i, rank its inverse."""
-    successor, probability, own_rows = transitions
-    n_states, n_actions, n_successors = successor.shape
-    for i in range(n_states):
+def _renumbered(successor: I32, order: I32) -> I32:
+    """Return the successors with i in place of state order[i]."""
+    rank, ordered = np.empty_like(order), np.empty_like(successor)
+    for i in range(len(order)):
         rank[order[i]] = i
-    for i in range(n_states):
-        s = order[i]
-        for a in range(n_actions):
-            for k in range(n_successors):
-                ordered.successor[i, a, k] = rank[successor[s, a, k]]
-                ordered.probability[own_rows * i, a, k] = probability[own_rows * s, a, k]
+    for i in range(len(order)):
+        for a in range(successor.shape[1]):
+            for k in range(successor.shape[2]):
+                ordered[i, a, k] = rank[successor[order[i], a, k]]
+    return ordered
 
 
 def in_order(
-    transitions: Transitions,
-    r: NDArray[np.float64],
-    terminal: NDArray[np.bool_],
-    gamma: float,
-    order: NDArray[np.int32],
-    V: NDArray[np.float64],
+    transitions: Transitions, r: F64, terminal: Bools, gamma: float, order: I32, V: F64
 ) -> Transitions:
     """Return the transitions in the order of the sweeps, in which i stands for state order[i].
 
-    Writes `order`, and the estimated values, in that order, into `V`.
+    Writes `order`, and in that order the estimated values into `V` and the rewards into `r`.
     """
-    n_states, n_actions, _ = transitions.successor.shape
-    scratch = np.empty(n_states, dtype=np.int32)
-    first = np.empty(n_states + 2, dtype=np.int64)
-    count_predecessors(transitions, first)
-    predecessor = np.empty(first[-1], dtype=np.int32)
-    action = np.empty(first[-1], dtype=action_type(n_actions))
-    link_predecessors(transitions, first, predecessor, action)
-    settled = np.empty(n_states, dtype=np.bool_)
-    best_first(
-        transitions, r, terminal, gamma, first, predecessor, action, V, order, scratch, settled
-    )
-    del first, predecessor, action, settled
-    ordered = Transitions(
-        np.empty_like(transitions.successor),
-        np.empty_like(transitions.probability),
-        transitions.own_rows,
-    )
-    rearrange(transitions, order, scratch, ordered)
-    del scratch
-    V[:] = V[order]
-    return ordered
+    successor, probability, own_rows = transitions
+    likeliest = probability.argmax(axis=2)[:, :, None]
+    leads_to = np.take_along_axis(successor, likeliest, axis=2)[:, :, 0]
+    best_first(leads_to, probability.max(axis=2), r, terminal, gamma, V, order)
+    del leads_to
+    V[:], r[:] = V[order], r[order]
+    ordered = probability[order] if own_rows else probability
+    return Transitions(_renumbered(successor, order), ordered, own_rows)
 
 
 @compiled
 def improvement_sweep(
     transitions: Transitions,
-    r: NDArray[np.float64],
+    r: F64,
     gamma: float,
-    V: NDArray[np.float64],
-    policy: NDArray[np.signedinteger],
-    chosen: NDArray[np.int32],
+    V: F64,
+    policy: Ints,
+    chosen: I32,
     backward: bool,
 ) -> tuple[float, float, int, float]:
     """Set V(s) = max_a q(s, a) in place, state after state, and note the action and successors.
@@ -369,12 +290,7 @@ def improvement_sweep(
 
 @compiled
 def evaluation_sweep(
-    transitions: Transitions,
-    r: NDArray[np.float64],
-    gamma: float,
-    V: NDArray[np.float64],
-    policy: NDArray[np.signedinteger],
-    chosen: NDArray[np.int32],
+    transitions: Transitions, r: F64, gamma: float, V: F64, policy: Ints, chosen: I32
 ) -> tuple[float, float]:
     """Set V(s) = q(s, policy(s)) in place: `improvement_sweep` for one action a state.
 

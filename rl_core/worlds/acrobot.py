@@ -5,8 +5,8 @@ import math
 import numpy as np
 from gymnasium import spaces
 from numba.extending import overload
-from numpy.typing import NDArray
 
+from rl_core.kernels.arrays import F32
 from rl_core.kernels.compiled import compiled
 from rl_core.worlds.tasks import Action, Observation, State, clip, task
 
@@ -67,7 +67,7 @@ def _observe(state: State, observation: Observation) -> None:
 
 def _observe_start(state: State, observation: Observation) -> None:
     """Observe with numpy's single precision cosine, as Gymnasium does after `reset`."""
-    angles: NDArray[np.float32] = state[:2].astype(np.float32)
+    angles: F32 = state[:2].astype(np.float32)
     observation[0:4:2] = np.cos(angles)
     observation[1:4:2] = np.sin(angles)
     observation[4:] = state[2:]

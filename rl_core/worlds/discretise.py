@@ -24,11 +24,18 @@ from typing import Any, NamedTuple
 import gymnasium
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rl_core.checks import floats, instance, integer, integers, require
+from rl_core.kernels.arrays import F32, F64, I64
 from rl_core.kernels.compiled import compiled
-from rl_core.worlds.environments import EnvironmentLike, checked_reward, opened
+from rl_core.worlds.environments import (
+    EnvironmentLike,
+    checked_reward,
+    native_action,
+    observed,
+    opened,
+)
 from rl_core.worlds.names import find
 from rl_core.worlds.tasks import Kernel, Task
 from rl_core.worlds.twins import twin
@@ -47,9 +54,9 @@ class Grid(NamedTuple):
         Bins in every dimension.
     """
 
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
-    bins: NDArray[np.int64]
+    low: F64
+    high: F64
+    bins: I64
 
     @property
     def n_cells(self) -> int:
@@ -126,7 +133,7 @@ def checked_bins(name: str, bins: object) -> int | tuple[int, ...]:
 
 
 @compiled
-def cell(grid: Grid, observation: NDArray[np.float32]) -> int:
+def cell(grid: Grid, observation: F32) -> int:
     """Number of the cell that an observation falls into, from 0.
 
     An infinity falls into the last or the first bin, like any number beyond the bounds.
@@ -152,7 +159,7 @@ def cell(grid: Grid, observation: NDArray[np.float32]) -> int:
     return index
 
 
-def action_levels(space: spaces.Space[Any], levels: int | None) -> NDArray[np.float32]:
+def action_levels(space: spaces.Space[Any], levels: int | None) -> F32:
     """Actions to choose from: all of a Discrete space, or a grid over a Box.
 
     Parameters
@@ -253,30 +260,25 @@ class Discretised(gymnasium.Wrapper[Any, Any, Any, Any]):
     def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
         """Take the action of this number; see `gymnasium.Env.step`."""
         self._steps += 1
-        taken: Any = self.levels[action]
-        if isinstance(self._native, spaces.Discrete):
-            taken = int(taken[0]) + int(self._native.start)
-        elif isinstance(self._native, spaces.Box):
-            taken = taken.astype(self._native.dtype).reshape(self._native.shape)
-        observation, reward, terminated, truncated, info = self.env.step(taken)
-        reward = checked_reward(f"{self.env}, at step {self._steps} of an episode", reward)
+        native = native_action(self._native, self.levels[action])
+        observation, reward, terminated, truncated, info = self.env.step(native)
+        reward = checked_reward(self._where(), reward)
         return self._cell(observation), reward, terminated, truncated, info
 
     def _cell(self, observation: Any) -> int:
-        """Number the cell; compiled code relies on the observation's size."""
+        """Number the cell."""
         space = self.env.observation_space
-        try:
-            seen = np.asarray(observation)
-        except ValueError:  # ragged nesting
-            seen = np.asarray(None)
-        fits = seen.shape == space.shape and seen.dtype.kind in "fiub"
-        if not fits or np.isnan(seen).any():
+        seen = observed(space, observation, self._where())
+        if np.isnan(seen).any():
             raise ValueError(
-                f"env must keep to its observation space {space}, from {self.env}, at step "
-                f"{self._steps} of an episode, came {observation!r}, which has no cell"
+                f"env must keep to its observation space {space}, from {self._where()}, came "
+                f"{observation!r}, which has no cell"
             )
         with np.errstate(over="ignore"):
             return int(cell(self.grid, seen.ravel().astype(np.float32)))
+
+    def _where(self) -> str:
+        return f"{self.env}, at step {self._steps} of an episode"
 
 
 class GriddedTask(NamedTuple):
@@ -297,8 +299,8 @@ class GriddedTask(NamedTuple):
 
     kernel: Kernel
     grid: Grid
-    actions: NDArray[np.float32]
-    observation: NDArray[np.float32]
+    actions: F32
+    observation: F32
     max_steps: int
 
     @property

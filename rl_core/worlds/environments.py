@@ -17,10 +17,10 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
-from numba.extending import overload
 from numpy.typing import NDArray
 
-from rl_core.kernels.compiled import compiled
+from rl_core.kernels.arrays import F32
+from rl_core.kernels.compiled import compiled, compiled_as
 from rl_core.worlds.names import Make, find, make_environment
 from rl_core.worlds.tasks import Kernel, Task
 from rl_core.worlds.twins import twin
@@ -52,7 +52,7 @@ class TaskWorld:
         """Start the environment's stream, the one Gymnasium makes of this seed."""
         self._rng = np.random.default_rng(environment_seed)
 
-    def reset(self) -> NDArray[np.float32]:
+    def reset(self) -> F32:
         """Begin an episode; return its first observation."""
         observation = np.empty(self.n_observations, np.float32)
         self._task.start(self._rng, self.stepper.state, observation)
@@ -93,7 +93,6 @@ class GymnasiumWorld:
         self.stepper = self
         self._environment = environment
         self._space, self._actions = observations, actions
-        self._shape, self._flat = observations.shape, len(observations.shape) == 1
         self._owned = owned
         self._seed: int | None = None
         self._steps = 0
@@ -102,49 +101,21 @@ class GymnasiumWorld:
         """Seed the environment at its next reset."""
         self._seed = environment_seed
 
-    def reset(self) -> NDArray[np.float32]:
+    def reset(self) -> F32:
         """Begin an episode; return its first observation."""
         observation, _ = self._environment.reset(seed=self._seed)
         self._seed, self._steps = None, 0
-        first = np.empty(self.n_observations, np.float32)
-        self._see(observation, first)
-        return first
+        return observed(self._space, observation, self).ravel().astype(np.float32)
 
-    def step(
-        self, action: NDArray[np.float32], following: NDArray[np.float32]
-    ) -> tuple[float, bool, bool]:
+    def step(self, action: F32, following: F32) -> tuple[float, bool, bool]:
         """Take one step; see `step`."""
         self._steps += 1
-        native: Any
-        if isinstance(self._actions, spaces.Discrete):
-            native = int(action[0]) + int(self._actions.start)
-        else:
-            native = action.astype(self._actions.dtype).reshape(self._actions.shape)
+        native = native_action(self._actions, action)
         seen, reward, terminated, truncated, _ = self._environment.step(native)
-        self._see(seen, following)
+        following[:] = observed(self._space, seen, self).ravel()
         # float(...) also of numpy's float64, which is a float, the quick way
         paid = float(reward) if isinstance(reward, float) else checked_reward(self, reward)
         return paid, bool(terminated), bool(truncated)
-
-    def _see(self, seen: Any, following: NDArray[np.float32]) -> None:
-        """Write an observation, if it is what its space says: compiled code relies on its size."""
-        array = type(seen) is np.ndarray
-        if not array or seen.shape != self._shape or seen.dtype.kind not in "fiub":
-            seen = self._numbers(seen)
-        following[:] = seen if self._flat else seen.ravel()
-
-    def _numbers(self, seen: Any) -> NDArray[Any]:
-        """Return an observation that is no array as one, if its numbers and shape are right."""
-        try:
-            array = np.asarray(seen)
-        except ValueError:  # ragged
-            array = np.asarray(None)
-        if array.shape == self._shape and array.dtype.kind in "fiub":
-            return array
-        raise ValueError(
-            f"env must keep to its observation space {self._space}, from {self}, came an "
-            f"observation of shape {array.shape} and type {array.dtype}"
-        )
 
     def __str__(self) -> str:
         name = self._environment.spec.id if self._environment.spec else self._environment
@@ -157,6 +128,46 @@ class GymnasiumWorld:
 
 
 World = TaskWorld | GymnasiumWorld
+
+
+def native_action(space: spaces.Space[Any], action: F32) -> Any:
+    """Return an action of a Discrete or a Box space as Gymnasium's environments take it.
+
+    Examples
+    --------
+    >>> native_action(spaces.Discrete(3, start=-1), np.array([2], np.float32))
+    1
+    """
+    if isinstance(space, spaces.Discrete):
+        return int(action[0]) + int(space.start)
+    return action.astype(space.dtype).reshape(space.shape)
+
+
+def observed(space: spaces.Space[Any], seen: Any, env: object) -> NDArray[Any]:
+    """Return what was seen of an environment, of which errors tell, as an array.
+
+    Compiled code relies on its size.
+
+    Raises
+    ------
+    ValueError
+        It is not made of numbers, or its shape is not that of the space.
+
+    Examples
+    --------
+    >>> observed(spaces.Box(0, 9, (2,)), [1, 2], "Pond-v0")
+    array([1, 2])
+    """
+    try:
+        array = np.asarray(seen)
+    except ValueError:  # ragged
+        array = np.asarray(None)
+    if array.shape != space.shape or array.dtype.kind not in "fiub":
+        raise ValueError(
+            f"env must keep to its observation space {space}, from {env}, came an observation of "
+            f"shape {array.shape} and type {array.dtype}"
+        )
+    return array
 
 
 def checked_reward(env: object, reward: Any) -> float:
@@ -179,9 +190,7 @@ def checked_reward(env: object, reward: Any) -> float:
     return float(number)
 
 
-def step(
-    stepper: Kernel | GymnasiumWorld, action: NDArray[np.float32], following: NDArray[np.float32]
-) -> tuple[float, bool, bool]:
+def step(stepper: Kernel | GymnasiumWorld, action: F32, following: F32) -> tuple[float, bool, bool]:
     """Take one step of a world.
 
     Parameters
@@ -212,20 +221,13 @@ def step(
 
 
 @compiled
-def _step_task(
-    kernel: Kernel, action: NDArray[np.float32], following: NDArray[np.float32]
-) -> tuple[float, bool, bool]:
+def _step_task(kernel: Kernel, action: F32, following: F32) -> tuple[float, bool, bool]:
     reward, terminated = kernel.step(kernel.state, action)
     kernel.observe(kernel.state, following)
     return reward, terminated, False
 
 
-# What it means in compiled code.
-overload(step)(
-    lambda stepper, action, following: (
-        lambda stepper, action, following: _step_task(stepper, action, following)
-    )
-)
+compiled_as(step, _step_task)
 
 
 def open_world(env: EnvironmentLike) -> World:

@@ -11,16 +11,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from numba.extending import overload
-from numpy.typing import NDArray
 
 from rl_core.kernels import likelihood
-from rl_core.kernels.compiled import compiled
+from rl_core.kernels.arrays import F32, F64
+from rl_core.kernels.compiled import compiled, compiled_as
 from rl_core.kernels.likelihood import Actor, Policy
 from rl_core.worlds.environments import TaskWorld, World, step
 
 
-def with_constant(policy: Policy, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+def with_constant(policy: Policy, observations: F32) -> F32:
     """Return the network's features: observations, and a constant 1 where the policy has one."""
     if not policy.constant_feature:
         return observations
@@ -35,12 +34,7 @@ class ModuleActor(NamedTuple):
     log_sigma: torch.Tensor
 
 
-def act(
-    actor: Actor | ModuleActor,
-    observation: NDArray[np.float32],
-    noise: NDArray[np.float64],
-    action: NDArray[np.float32],
-) -> None:
+def act(actor: Actor | ModuleActor, observation: F32, noise: F64, action: F32) -> None:
     """Turn noise into an action drawn from pi(.|s), and write it to `action`.
 
     Parameters
@@ -62,14 +56,7 @@ def act(
     likelihood.draw_action(actor.policy, actor.log_sigma.detach().numpy(), units, noise, action)
 
 
-# What it means in compiled code.
-overload(act)(
-    lambda actor, observation, noise, action: (
-        lambda actor, observation, noise, action: likelihood.choose_action(
-            actor, observation, noise, action
-        )
-    )
-)
+compiled_as(act, likelihood.choose_action)
 
 
 class Trajectory:
@@ -87,9 +74,7 @@ class Trajectory:
         self.actions = np.empty((capacity, action_width), np.float32)
         self.rewards = np.empty(capacity)
 
-    def first(
-        self, steps: int
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float64]]:
+    def first(self, steps: int) -> tuple[F32, F32, F64]:
         """Observations, actions and rewards of the first steps: views."""
         return self.observations[:steps], self.actions[:steps], self.rewards[:steps]
 
@@ -106,9 +91,9 @@ def play(
     stepper: Any,
     actor: Any,
     rng: np.random.Generator,
-    observations: NDArray[np.float32],
-    actions: NDArray[np.float32],
-    rewards: NDArray[np.float64],
+    observations: F32,
+    actions: F32,
+    rewards: F64,
     t: int,
     stop: int,
 ) -> tuple[int, bool, bool]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from rl_core import checks
+from rl_core.kernels.arrays import I32, Bools
 from rl_core.kernels.compiled import compiled
 
 COURSE_LAYOUT = """\
@@ -181,9 +182,7 @@ def _check_goals(letters: NDArray[np.str_]) -> None:
 
 
 @compiled
-def _spanning_tree(
-    rows: int, columns: int, root: int, rng: np.random.Generator
-) -> NDArray[np.int32]:
+def _spanning_tree(rows: int, columns: int, root: int, rng: np.random.Generator) -> I32:
     """Return each cell's parent in a random tree over the grid; the root is its own parent.
 
     Cells are numbered row by row. The tree grows by an edge drawn from those that leave it.
@@ -213,9 +212,7 @@ def _spanning_tree(
 
 
 @compiled
-def _wall_up_leaves(
-    parent: NDArray[np.int32], n_walls: int, rng: np.random.Generator
-) -> tuple[NDArray[np.bool_], NDArray[np.int32]]:
+def _wall_up_leaves(parent: I32, n_walls: int, rng: np.random.Generator) -> tuple[Bools, I32]:
     """Take `n_walls` random leaves off the tree, one by one; return walls and the leaves left.
 
     The root stays and is not counted as a leaf.

@@ -1,17 +1,17 @@
 """A picture of a maze as an array of pixels, for frames of an animation.
 
-Shapes are given in cell units (a cell is the square [0, 1] × [0, 1], y downwards) and drawn by
-Pillow at four times the size, which gives soft edges when it is made smaller again.
+Shapes are given in units of a cell, which is the square [0, 1] × [0, 1], y downwards.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from math import cos, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
+
+from rl_core.kernels.arrays import Bools
 
 Cell = tuple[int, int]
 Colour = tuple[int, int, int]
@@ -19,7 +19,6 @@ Colour = tuple[int, int, int]
 CELL_PIXELS = 96
 """Side of a cell; less in mazes that would be wider or higher than `MAX_PIXELS`."""
 MAX_PIXELS = 1536
-SUPERSAMPLING = 4
 
 # The palette of Okabe and Ito, which colour-blind readers can tell apart, and greys.
 BLUE = (0, 114, 178)
@@ -29,13 +28,12 @@ VERMILLION = (213, 94, 0)
 YELLOW = (240, 228, 66)
 WHITE = (255, 255, 255)
 FLOOR = (246, 246, 246)
-LINE = (214, 214, 214)
 POLE = (90, 90, 90)
 WALL = (60, 60, 60)
 
 
 def draw_maze(
-    walls: NDArray[np.bool_],
+    walls: Bools,
     start: Cell,
     goals: Iterable[Cell],
     flag_cells: Mapping[str, Cell],
@@ -74,73 +72,28 @@ def draw_maze(
     ((96, 288, 3), dtype('uint8'))
     """
     side = max(1, min(CELL_PIXELS, MAX_PIXELS // max(walls.shape)))
-    tiles: dict[Cell, _Tile] = {}
+    ground = np.where(walls[:, :, None], WALL, FLOOR).astype(np.uint8)
+    image = Image.fromarray(ground.repeat(side, axis=0).repeat(side, axis=1))
+    draw = ImageDraw.Draw(image)
 
-    def tile(cell: Cell) -> _Tile:
-        return tiles.setdefault(cell, _Tile(side))
+    def at(cell: Cell, *points: tuple[float, float]) -> list[tuple[float, float]]:
+        row, column = cell
+        return [((column + x) * side, (row + y) * side) for x, y in points]
 
-    tile(start).square(0.06, SKY_BLUE)
-    tile(start).square(0.12, FLOOR)
+    def disc(cell: Cell, x: float, y: float, radius: float, colour: Colour) -> None:
+        draw.ellipse(at(cell, (x - radius, y - radius), (x + radius, y + radius)), colour)
+
+    draw.rectangle(at(start, (0.06, 0.06), (0.94, 0.94)), outline=SKY_BLUE, width=1 + side // 16)
     for goal in goals:
         for radius, colour in ((0.40, GREEN), (0.28, WHITE), (0.16, GREEN)):
-            tile(goal).disc(0.5, 0.5, radius, colour)
+            disc(goal, 0.5, 0.5, radius, colour)
     for flag, cell in flag_cells.items():
-        tile(cell).flag(taken=flag in held)
+        draw.rectangle(at(cell, (0.27, 0.12), (0.33, 0.88)), POLE)
+        pennant = at(cell, (0.33, 0.13), (0.80, 0.31), (0.33, 0.49))
+        draw.polygon(pennant, FLOOR if flag in held else VERMILLION, outline=POLE)
     for radius, colour in ((0.34, WHITE), (0.30, BLUE)):
-        tile(agent).disc(0.5, 0.5, radius, colour)
-    for x, y, radius in _dots(len(held)):
-        tile(agent).disc(x, y, radius, YELLOW)
-
-    # canvas[row, y, column, x] is a pixel; canvas[row, :, column] one cell.
-    wall = np.full((side, side, 3), WALL, dtype=np.uint8)
-    canvas = np.where(walls[:, None, :, None, None], wall[:, None], _Tile(side).pixels()[:, None])
-    for (row, column), drawn in tiles.items():
-        canvas[row, :, column] = drawn.pixels()
-    rows, columns = walls.shape
-    return canvas.reshape(rows * side, columns * side, 3)
-
-
-class _Tile:
-    """One cell of the floor, to draw on."""
-
-    def __init__(self, side: int) -> None:
-        self._size = SUPERSAMPLING * side
-        self._image = Image.new("RGB", (self._size, self._size), LINE)
-        self._draw = ImageDraw.Draw(self._image)
-        self._polygon(FLOOR, (0, 0), (0.98, 0), (0.98, 0.98), (0, 0.98))  # the rest is the grid
-
-    def pixels(self) -> NDArray[np.uint8]:
-        """Return red, green and blue, shape (side, side, 3)."""
-        return np.asarray(self._image.reduce(SUPERSAMPLING))
-
-    def square(self, margin: float, colour: Colour) -> None:
-        """Fill what lies inside a margin."""
-        far = 1 - margin
-        self._polygon(colour, (margin, margin), (far, margin), (far, far), (margin, far))
-
-    def disc(self, x: float, y: float, radius: float, colour: Colour) -> None:
-        """Fill a disc: as above, half a pixel smaller all round."""
-        centre = x * self._size - 0.5, y * self._size - 0.5
-        self._draw.circle(centre, radius * self._size - 0.5, colour)
-
-    def flag(self, taken: bool) -> None:
-        """Draw a pole with a pennant, or what is left of it."""
-        self._polygon(POLE, (0.275, 0.12), (0.325, 0.12), (0.325, 0.88), (0.275, 0.88))
-        self._polygon(POLE, (0.18, 0.83), (0.42, 0.83), (0.42, 0.88), (0.18, 0.88))
-        self._polygon(POLE if taken else VERMILLION, (0.325, 0.13), (0.80, 0.31), (0.325, 0.49))
-        if taken:
-            self._polygon(FLOOR, (0.35, 0.168), (0.725, 0.31), (0.35, 0.452))
-
-    def _polygon(self, colour: Colour, *corners: tuple[float, float]) -> None:
-        """Fill a polygon: Pillow counts the pixels on the rim as inside."""
-        last = self._size - 1
-        self._draw.polygon([(x * last, y * last) for x, y in corners], colour)
-
-
-def _dots(number: int) -> list[tuple[float, float, float]]:
-    """Return x, y and radius of dots: one in the middle, several in a ring."""
-    if number == 1:
-        return [(0.5, 0.5, 0.08)]
-    angles = [2 * pi * i / number for i in range(number)]
-    radius = min(0.07, 0.5 / max(number, 1))
-    return [(0.5 + 0.16 * sin(t), 0.5 - 0.16 * cos(t), radius) for t in angles]
+        disc(agent, 0.5, 0.5, radius, colour)
+    for i in range(len(held)):
+        down, right = divmod(i, 4)
+        disc(agent, 0.35 + 0.1 * right, 0.35 + 0.1 * down, 0.04, YELLOW)
+    return np.asarray(image)

@@ -16,9 +16,9 @@ from typing import Any
 import numba
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from rl_core.identity import code_behind, imported
+from rl_core.kernels.arrays import F32
 from rl_core.kernels.compiled import compiled
 from rl_core.worlds.tasks import _FirstClass
 
@@ -28,12 +28,12 @@ ORIGINAL = "rl_core.worlds.shaping:original"
 _SIGNATURE = types.float64(types.Array(types.float32, 1, "C"), types.float64)
 
 
-def original(observation: NDArray[np.float32], reward: float) -> float:
+def original(observation: F32, reward: float) -> float:
     """The environment's own reward."""
     return reward
 
 
-def tip_height(observation: NDArray[np.float32], reward: float) -> float:
+def tip_height(observation: F32, reward: float) -> float:
     """Acrobot: r = -(cos theta1 + cos(theta1 + theta2)), the height of the tip above the pivot.
 
     From -2 (hanging) to 2 (upright); the goal is above 1. An observation holds the cosines and
@@ -50,7 +50,7 @@ def tip_height(observation: NDArray[np.float32], reward: float) -> float:
     return -(cosine1 + (cosine1 * cosine2 - sine1 * sine2))
 
 
-def distance_from_start(observation: NDArray[np.float32], reward: float) -> float:
+def distance_from_start(observation: F32, reward: float) -> float:
     """MountainCar: r = |position - (-0.5)|, the distance from the middle of the starting places.
 
     From 0 to 1, which is at the flag.
@@ -63,7 +63,7 @@ def distance_from_start(observation: NDArray[np.float32], reward: float) -> floa
     return abs(float(observation[0]) + 0.5)
 
 
-def balance(observation: NDArray[np.float32], reward: float) -> float:
+def balance(observation: F32, reward: float) -> float:
     """CartPole: r = (1 - |x| / 2.4 - 2 |theta|) / 20, most for an upright pole in the middle.
 
     An episode ends when x (metres) leaves [-2.4, 2.4] or theta (radians) leaves [-0.21, 0.21]. The
@@ -153,7 +153,7 @@ def shape_for(shaping: Shaping | None, n_observations: int) -> Any:
 
 
 @compiled
-def shaped_reward(shape: Any, observation: NDArray[np.float32], reward: float) -> float:
+def shaped_reward(shape: Any, observation: F32, reward: float) -> float:
     """Return what a compiled shape makes of a reward and the observation that came with it.
 
     Examples

@@ -12,15 +12,14 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rl_core import checks
+from rl_core.kernels.arrays import Arrays
 from rl_core.kernels.bounds import SUM_TOLERANCE
 
 
-def read_table(
-    env: gym.Env[Any, Any], start_distribution: ArrayLike | None = None
-) -> dict[str, NDArray[Any]]:
+def read_table(env: gym.Env[Any, Any], start_distribution: ArrayLike | None = None) -> Arrays:
     """Return the arrays of an `rl_core.mdp.MDP` by name; see `MDP.from_env` for the rules.
 
     Examples
@@ -71,7 +70,7 @@ def read_table(
     }
 
 
-def start_arrays(start_distribution: ArrayLike, n_states: int) -> dict[str, NDArray[Any]]:
+def start_arrays(start_distribution: ArrayLike, n_states: int) -> Arrays:
     """Return the states of nonzero probability and their probabilities, by name.
 
     Examples

@@ -18,9 +18,10 @@ import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
 from numba.extending import overload
-from numpy.typing import NDArray
 
+from rl_core.kernels.arrays import F64
 from rl_core.kernels.compiled import compiled
+from rl_core.kernels.model import Model
 from rl_core.mdp import MDP
 from rl_core.worlds.discretise import GriddedTask, start_gridded, step_gridded
 from rl_core.worlds.environments import EnvironmentLike, checked_reward, opened
@@ -54,36 +55,6 @@ def spawn_draws(seed: int, n: int) -> list[Draws]:
     numbers = [int(child.generate_state(1, np.uint64)[0]) for child in children]
     generators = [np.random.default_rng(number) for number in numbers]
     return [Draws(*generators[3 * i : 3 * i + 3]) for i in range(n)]
-
-
-class Model(NamedTuple):
-    """An `MDP` as compiled code steps through it: with cumulative probabilities."""
-
-    successor: NDArray[np.int32]
-    cumulative: NDArray[np.float64]
-    reward: NDArray[np.float64]
-    terminal: NDArray[np.bool_]
-    start_state: NDArray[np.int32]
-    start_cumulative: NDArray[np.float64]
-
-
-def model_arrays(mdp: MDP) -> Model:
-    """Return the arrays of a model.
-
-    Examples
-    --------
-    >>> from rl_core.maze import Maze
-    >>> model_arrays(Maze().model()).cumulative[0, 0].tolist()
-    [0.9, 1.0]
-    """
-    return Model(
-        mdp.successor,
-        np.cumsum(mdp.probability, axis=2),
-        mdp.reward,
-        mdp.terminal,
-        mdp.start_state,
-        np.cumsum(mdp.start_probability),
-    )
 
 
 @dataclass
@@ -176,13 +147,13 @@ def step(world: DiscreteWorld, s: int, a: int, draws: Draws) -> tuple[int, float
 @compiled
 def _start_on_model(model: Model, draws: Draws) -> int:
     """Draw a start state by one uniform."""
-    return int(model.start_state[_slot(model.start_cumulative, draws.start.random())])
+    return int(model.start_state[_slot(model.start_probability, draws.start.random())])
 
 
 @compiled
 def _step_on_model(model: Model, s: int, a: int, draws: Draws) -> tuple[int, float, bool, bool]:
     """Draw s' and r by one uniform. A terminal s' terminates; nothing truncates."""
-    k = _slot(model.cumulative[s, a], draws.step.random())
+    k = _slot(model.probability[s, a], draws.step.random())
     s_next = int(model.successor[s, a, k])
     return s_next, float(model.reward[s, a, k]), bool(model.terminal[s_next]), False
 
@@ -195,10 +166,12 @@ def _step_in_grid(world: GriddedTask, a: int) -> tuple[int, float, bool, bool]:
 
 
 @compiled
-def _slot(cumulative: NDArray[np.float64], u: float) -> int:
+def _slot(probability: F64, u: float) -> int:
     """Return the first slot whose cumulative probability exceeds u, as Gymnasium does."""
-    for k in range(len(cumulative)):
-        if cumulative[k] > u:
+    cumulative = 0.0
+    for k in range(len(probability)):
+        cumulative += probability[k]
+        if cumulative > u:
             return k
     return 0
 

@@ -34,14 +34,14 @@ from numba.core.types import boolean, float32, float64, void
 from numba.core.types.npytypes import NumPyRandomGeneratorType
 from numba.experimental.function_type import FunctionModel
 from numba.extending import NativeValue, register_model, unbox
-from numpy.typing import NDArray
 
 from rl_core.checks import fields, instance, integer, optional, require
+from rl_core.kernels.arrays import F32, F64
 from rl_core.kernels.compiled import compiled
 
-State = NDArray[np.float64]
-Observation = NDArray[np.float32]
-Action = NDArray[np.float32]
+State = F64
+Observation = F32
+Action = F32
 Start = Callable[[np.random.Generator, State, Observation], None]
 Step = Callable[[State, Action], tuple[float, bool]]
 Observe = Callable[[State, Observation], None]

@@ -1,7 +1,7 @@
 """Which of Gymnasium's environments are played compiled."""
 
 from dataclasses import replace
-from typing import Any, cast
+from typing import Any
 
 import gymnasium
 
@@ -13,25 +13,19 @@ from rl_core.worlds.pendulum import Pendulum
 from rl_core.worlds.tasks import Task
 
 # Type checkers do not see that a decorator makes something else of a class.
-TASKS: dict[str, Task] = cast(
-    Any,
-    {
-        "Acrobot-v1": Acrobot,
-        "CartPole-v1": CartPole,
-        "MountainCar-v0": MountainCar,
-        "MountainCarContinuous-v0": MountainCarContinuous,
-        "Pendulum-v1": Pendulum,
-    },
-)
-"""The exact twins of Gymnasium's environments by their id."""
-
-_ENTRY_POINTS = {
-    "Acrobot-v1": "acrobot:AcrobotEnv",
-    "CartPole-v1": "cartpole:CartPoleEnv",
-    "MountainCar-v0": "mountain_car:MountainCarEnv",
-    "MountainCarContinuous-v0": "continuous_mountain_car:Continuous_MountainCarEnv",
-    "Pendulum-v1": "pendulum:PendulumEnv",
+_TWINS: dict[str, tuple[str, Any]] = {
+    "Acrobot-v1": ("acrobot:AcrobotEnv", Acrobot),
+    "CartPole-v1": ("cartpole:CartPoleEnv", CartPole),
+    "MountainCar-v0": ("mountain_car:MountainCarEnv", MountainCar),
+    "MountainCarContinuous-v0": (
+        "continuous_mountain_car:Continuous_MountainCarEnv",
+        MountainCarContinuous,
+    ),
+    "Pendulum-v1": ("pendulum:PendulumEnv", Pendulum),
 }
+
+TASKS: dict[str, Task] = {env_id: task for env_id, (_, task) in _TWINS.items()}
+"""The exact twins of Gymnasium's environments by their id."""
 
 
 def twin(env_id: str) -> Task | None:
@@ -51,7 +45,7 @@ def twin(env_id: str) -> Task | None:
     task, spec = TASKS.get(env_id), gymnasium.registry.get(env_id)
     if task is None or spec is None:
         return None
-    entry_point = f"gymnasium.envs.classic_control.{_ENTRY_POINTS[env_id]}"
+    entry_point = f"gymnasium.envs.classic_control.{_TWINS[env_id][0]}"
     if spec.entry_point != entry_point or spec.kwargs or spec.additional_wrappers:
         return None
     if task.max_episode_steps in (None, spec.max_episode_steps):
