@@ -93,7 +93,8 @@ class GymnasiumWorld:
         self.stepper = self
         self._environment = environment
         self._space, self._actions = observations, actions
-        self._shape, self._flat = observations.shape, len(observations.shape) == 1
+        # What is written as it came; -1: it has to be flattened first.
+        self._length = observations.shape[0] if len(observations.shape) == 1 else -1
         self._owned = owned
         self._seed: int | None = None
         self._steps = 0
@@ -106,9 +107,7 @@ class GymnasiumWorld:
         """Begin an episode; return its first observation."""
         observation, _ = self._environment.reset(seed=self._seed)
         self._seed, self._steps = None, 0
-        first = np.empty(self.n_observations, np.float32)
-        self._see(observation, first)
-        return first
+        return self._numbers(observation).astype(np.float32)
 
     def step(
         self, action: NDArray[np.float32], following: NDArray[np.float32]
@@ -121,26 +120,22 @@ class GymnasiumWorld:
         else:
             native = action.astype(self._actions.dtype).reshape(self._actions.shape)
         seen, reward, terminated, truncated, _ = self._environment.step(native)
-        self._see(seen, following)
-        # float(...) also of numpy's float64, which is a float, the quick way
-        paid = float(reward) if isinstance(reward, float) else checked_reward(self, reward)
-        return paid, bool(terminated), bool(truncated)
-
-    def _see(self, seen: Any, following: NDArray[np.float32]) -> None:
-        """Write an observation, if it is what its space says: compiled code relies on its size."""
-        array = type(seen) is np.ndarray
-        if not array or seen.shape != self._shape or seen.dtype.kind not in "fiub":
-            seen = self._numbers(seen)
-        following[:] = seen if self._flat else seen.ravel()
+        try:  # the quick way: numpy refuses other shapes, but for one number, and what is no number
+            np.copyto(following, seen if len(seen) == self._length else None)
+        except (RuntimeError, TypeError, ValueError):
+            following[:] = self._numbers(seen)
+        if type(reward) is not float:  # numpy's float64 is one, too
+            reward = float(reward) if isinstance(reward, float) else checked_reward(self, reward)
+        return reward, bool(terminated), bool(truncated)
 
     def _numbers(self, seen: Any) -> NDArray[Any]:
-        """Return an observation that is no array as one, if its numbers and shape are right."""
+        """Return an observation flattened, if its shape and numbers are what its space says."""
         try:
             array = np.asarray(seen)
-        except ValueError:  # ragged
+        except (RuntimeError, TypeError, ValueError):  # ragged, or what its own code raises
             array = np.asarray(None)
-        if array.shape == self._shape and array.dtype.kind in "fiub":
-            return array
+        if array.shape == self._space.shape and array.dtype.kind in "fiub":
+            return array.ravel()
         raise ValueError(
             f"env must keep to its observation space {self._space}, from {self}, came an "
             f"observation of shape {array.shape} and type {array.dtype}"
