@@ -26,7 +26,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from rl_core.checks import floats, instance, integer, integers, require
+from rl_core.checks import floats, instance, integer, integers, optional, require
 from rl_core.kernels.compiled import compiled
 from rl_core.worlds.environments import EnvironmentLike, checked_reward, opened
 from rl_core.worlds.names import find
@@ -93,7 +93,7 @@ def make_grid(
     d = math.prod(space.shape)
     bounds = []
     for name, given, own in (("low", low, space.low), ("high", high, space.high)):
-        bound = floats(name, np.ravel(own if given is None else given), (d,), finite=False)
+        bound = floats(name, np.ravel(own) if given is None else given, (d,), finite=False)
         finite = bool(np.isfinite(bound).all())
         require(finite, name, bound.tolist(), "finite in every dimension; give bounds to use")
         bounds.append(bound)
@@ -246,14 +246,16 @@ class Discretised(gymnasium.Wrapper[Any, Any, Any, Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[int, dict[str, Any]]:
         """Begin an episode; see `gymnasium.Env.reset`."""
+        optional("options", options, instance, dict, "a dict")
+        seed = optional("seed", seed, integer)
         observation, info = self.env.reset(seed=seed, options=options)
         self._steps = 0
         return self._cell(observation), info
 
     def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
         """Take the action of this number; see `gymnasium.Env.step`."""
+        taken: Any = self.levels[integer("action", action, 0, len(self.levels) - 1)]
         self._steps += 1
-        taken: Any = self.levels[action]
         if isinstance(self._native, spaces.Discrete):
             taken = int(taken[0]) + int(self._native.start)
         elif isinstance(self._native, spaces.Box):
@@ -267,7 +269,7 @@ class Discretised(gymnasium.Wrapper[Any, Any, Any, Any]):
         space = self.env.observation_space
         try:
             seen = np.asarray(observation)
-        except ValueError:  # ragged nesting
+        except (RuntimeError, TypeError, ValueError):  # ragged nesting, or what its own code raises
             seen = np.asarray(None)
         fits = seen.shape == space.shape and seen.dtype.kind in "fiub"
         if not fits or np.isnan(seen).any():

@@ -18,8 +18,10 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 from numba.extending import overload
+from numpy import copyto
 from numpy.typing import NDArray
 
+from rl_core.checks import distinct_seeds
 from rl_core.kernels.compiled import compiled
 from rl_core.worlds.names import Make, find, make_environment
 from rl_core.worlds.tasks import Kernel, Task
@@ -121,7 +123,7 @@ class GymnasiumWorld:
             native = action.astype(self._actions.dtype).reshape(self._actions.shape)
         seen, reward, terminated, truncated, _ = self._environment.step(native)
         try:  # the quick way: numpy refuses other shapes, but for one number, and what is no number
-            np.copyto(following, seen if len(seen) == self._length else None)
+            copyto(following, seen if len(seen) == self._length else None)
         except (RuntimeError, TypeError, ValueError):
             following[:] = self._numbers(seen)
         if type(reward) is not float:  # numpy's float64 is one, too
@@ -295,7 +297,7 @@ def opened(env: Any) -> gymnasium.Env[Any, Any]:
     return made
 
 
-def one_seed_of(env: object, seeds: Iterable[int]) -> Iterable[int]:
+def one_seed_of(env: object, seeds: Iterable[int]) -> tuple[int, ...]:
     """Return the seeds, unless there are several and the environment is ready made.
 
     What an environment or its wrappers remember would go from one seed to the next, and the seeds
@@ -312,10 +314,10 @@ def one_seed_of(env: object, seeds: Iterable[int]) -> Iterable[int]:
     Traceback (most recent call last):
     ValueError: env must be an id or a function that makes an environment where there are several...
     """
-    seeds = tuple(seeds) if isinstance(seeds, Iterable) else seeds
-    if isinstance(env, gymnasium.Env) and isinstance(seeds, tuple) and len(seeds) > 1:
+    found = distinct_seeds(seeds)
+    if isinstance(env, gymnasium.Env) and len(found) > 1:
         raise ValueError(
             "env must be an id or a function that makes an environment where there are several "
             f"seeds, which would share what one environment remembers, got {env!r}"
         )
-    return seeds
+    return found
