@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from rl_core.checks import distinct_seeds, instance, integer, integers
+from rl_core.checks import distinct_seeds, instance, integer, integers, require
 
 PROGRESS_EVERY = 10
 """Episodes between two reports of progress."""
@@ -236,6 +236,8 @@ def train_seeds(
 
         training = Training(seed, episodes, snapshots, report)
         train(training)
+        allowed = "a function that keeps under '' what is learned at last"
+        require("" in training.kept, "train", train, allowed)
         done.append(training)
         report(episodes, training.env_steps)
     return Run(

@@ -347,8 +347,8 @@ HOW = {"name", "allowed", "check", "modules"}
 WORK = {"episodes": 10**4, "resamples": 10**4, "max_steps": 10**4, "max_episode_steps": 10**4,
         "rows": 10**3, "columns": 10**3, "points": 10**3, "n_inputs": 10**4, "n_outputs": 10**4,
         "n_observations": 10**4, "n_actions": 10**4, "n_states": 10**6, "n": 10**3,
-        "hidden": 10**4, "workers": 8}  # fmt: skip
-"""How much of it is a day's work or all the memory: more is allowed, and not tried out."""
+        "hidden": 10**4, "workers": 1}  # fmt: skip
+"""More of it is allowed, and is a day's work, all the memory, or a process each: not tried out."""
 
 EVERY = 4
 """Of the odd values for an argument, one in so many is tried: with 1 it takes minutes."""
@@ -356,6 +356,8 @@ EVERY = 4
 
 def too_much(name: str, value: object) -> bool:
     """Whether the value is an allowed amount of work that a test cannot wait for."""
+    if name == "workers" and value is None:  # as many as there are cores
+        return True
     amounts = value if isinstance(value, list | tuple) else [value]
     return name in WORK and any(
         isinstance(one, Integral) and not isinstance(one, bool) and WORK[name] < one < 2**63
@@ -457,7 +459,8 @@ def main(share: int, shares: int, first: int) -> None:
     sys.stdout = sys.stderr  # what a function prints is not read
     for name in CALLS:  # compiles and imports what will be needed
         found(name)(**CALLS[name]())
-    print("ready", file=told, flush=True)
+        print("warmer", file=told, flush=True)
+    print("warm", file=told, flush=True)
     for i, call in list(enumerate(plan()))[share::shares]:
         if i >= first:
             print(json.dumps([i]), file=told, flush=True)

@@ -19,7 +19,7 @@ ROOT = Path(__file__).parent.parent
 PROCESSES = 2
 LEAST = 3_000
 NAMELESS = 0.01  # share of the refusals that need not name the argument
-START, PATIENCE = 600, 60  # seconds; to compile and warm up, and for one call, which takes some ms
+COLD, PATIENCE = 600, 60  # seconds for a call that may compile, and for one that takes some ms
 WORST = 3  # processes lost to hangs and aborts before a share is given up
 
 
@@ -49,18 +49,24 @@ def test_every_argument_is_in_the_calls():
 class Share:
     """One process after the other, until all calls of a share are made."""
 
-    def __init__(self, share: int, folder: Path) -> None:
+    def __init__(self, share: int, folder: Path, warm: threading.Event) -> None:
         self.share, self.folder = share, folder
+        self.warm = warm  # the first compiles, the others find it done
         self.found: dict[int, str] = {}
 
     def work(self) -> None:
         """Make all calls of the share, in as many processes as it takes."""
+        if self.share:
+            self.warm.wait()
         first = 0
-        for _ in range(WORST + 1):
-            lost = self.go_on(first)
-            if lost is None:
-                return
-            first = lost + 1
+        try:
+            for _ in range(WORST + 1):
+                lost = self.go_on(first)
+                if lost is None:
+                    break
+                first = lost + 1
+        finally:
+            self.warm.set()
 
     def go_on(self, first: int) -> int | None:
         """Make the calls from `first` on; return the one that ended it, None if all were made."""
@@ -76,7 +82,7 @@ class Share:
         ):  # fmt: skip
             lines: queue.Queue[bytes] = queue.Queue()
             threading.Thread(target=self.read, args=(process, lines), daemon=True).start()
-            now, patience = -1, START
+            now, patience = -1, COLD
             while True:
                 try:
                     line = lines.get(timeout=patience)
@@ -86,8 +92,12 @@ class Share:
                     return now
                 if not line:
                     break
+                if line == b"warmer\n":
+                    continue
                 patience = PATIENCE
-                if line != b"ready\n":
+                if line == b"warm\n":
+                    self.warm.set()
+                else:
                     now, *told = json.loads(line)
                     self.found[now] = told[0] if told else "the process ends"
         return now if self.found.get(now, "") == "the process ends" or process.returncode else None
@@ -103,7 +113,8 @@ class Share:
 @pytest.fixture(scope="module")
 def outcomes(tmp_path_factory):
     """What came of every call, by what was called."""
-    shares = [Share(i, tmp_path_factory.mktemp(f"share{i}")) for i in range(PROCESSES)]
+    warm = threading.Event()
+    shares = [Share(i, tmp_path_factory.mktemp(f"share{i}"), warm) for i in range(PROCESSES)]
     threads = [threading.Thread(target=share.work) for share in shares]
     for thread in threads:
         thread.start()
