@@ -32,6 +32,8 @@ EnvironmentLike = (
 )
 """An id, an id with arguments, an import path, a task, an environment, or a function making one."""
 
+_NO_NUMBERS: Any = None
+
 
 class TaskWorld:
     """A compiled task.
@@ -123,7 +125,7 @@ class GymnasiumWorld:
             native = action.astype(self._actions.dtype).reshape(self._actions.shape)
         seen, reward, terminated, truncated, _ = self._environment.step(native)
         try:  # the quick way: numpy refuses other shapes, but for one number, and what is no number
-            copyto(following, seen if len(seen) == self._length else None)
+            copyto(following, seen if len(seen) == self._length else _NO_NUMBERS)
         except (RuntimeError, TypeError, ValueError):
             following[:] = self._numbers(seen)
         if type(reward) is not float:  # numpy's float64 is one, too
