@@ -180,7 +180,7 @@ def integers(
     >>> integers("seeds", np.arange(3))
     (0, 1, 2)
     """
-    scalar = isinstance(values, str | bytes) or (isinstance(values, np.ndarray) and not values.ndim)
+    scalar = isinstance(values, str | bytes) or getattr(values, "ndim", 1) == 0
     if scalar or not isinstance(values, Iterable):
         _refuse(TypeError, name, values, f"a sequence of integers from {least}")
     return tuple(integer(name, value, least, most) for value in values)
@@ -227,7 +227,7 @@ def floats(
     )
     try:
         given = np.asarray(values)
-    except ValueError:  # ragged nesting
+    except (RuntimeError, TypeError, ValueError):  # ragged nesting, or what its own code raises
         _refuse(ValueError, name, values, wanted)
     numbers = given.dtype != object or all(isinstance(x, Real) for x in given.ravel())
     if given.size and (given.dtype.kind not in "iufO" or not numbers):

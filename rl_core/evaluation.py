@@ -133,6 +133,7 @@ def greedy(agent: Agent) -> Agent:
     >>> greedy(Agent(policy, np.array([1, 2, 0, 0], np.float32))).parameters / COLD
     array([1., 2., 0., 0.], dtype=float32)
     """
+    instance("agent", agent, Agent, "an Agent")
     policy, parameters = agent.policy, agent.parameters.copy()
     if policy.gaussian:
         parameters[parameters.size - policy.action_width :] = -np.inf
@@ -150,6 +151,8 @@ def uniform(n_observations: int, n_actions: int) -> Agent:
     >>> uniform(6, 3).parameters.any()
     np.False_
     """
+    n_observations = integer("n_observations", n_observations, 1)
+    n_actions = integer("n_actions", n_actions, 1)
     policy = Policy(np.array([n_observations, n_actions]), False, False, False, 1)
     return Agent(policy, np.zeros((n_observations + 1) * n_actions, np.float32))
 
@@ -162,6 +165,7 @@ def evaluation_streams(seed: int) -> tuple[int, np.random.Generator]:
     >>> evaluation_streams(0)[0] == evaluation_streams(1)[0]
     False
     """
+    seed = integer("seed", seed)
     environment, policy = np.random.SeedSequence(seed, spawn_key=SPAWN_KEY).spawn(2)
     return int(environment.generate_state(1)[0]), np.random.default_rng(policy)
 
@@ -354,6 +358,8 @@ def check_fit(agent: Agent, world: World) -> None:
     Traceback (most recent call last):
     ValueError: agent must be a categorical policy of 3 actions, got a categorical policy of 5
     """
+    instance("agent", agent, Agent, "an Agent")
+    instance("world", world, World, "a world that was opened")
     policy, parameters, _ = agent
     inputs = world.n_observations + policy.constant_feature
     sizes = policy.sizes.tolist()
@@ -507,6 +513,7 @@ def mean_actions(
     >>> mean_actions(config, weights, np.array([[1.0, 10.0]]))
     array([[21.]], dtype=float32)
     """
+    instance("config", config, ReinforceConfig, "a ReinforceConfig")
     require(isinstance(config.policy, Gaussian), "policy", config.policy, "Gaussian(...)")
     policy, parameters, _ = as_learned(config, weights)
     width = int(policy.sizes[0]) - policy.constant_feature

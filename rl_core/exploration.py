@@ -62,7 +62,7 @@ class Linear:
 
     def values(self, episodes: int) -> F64:
         """Return the values of the first `episodes` episodes, float64 of shape (episodes,)."""
-        duration = _by_the_episode(self)
+        duration, episodes = _by_the_episode(self), integer("episodes", episodes)
         share = np.minimum(1.0, np.arange(episodes) / duration)
         return _between(self, duration, (1.0 - share) * self.start + share * self.end)
 
@@ -100,7 +100,7 @@ class Geometric:
 
     def values(self, episodes: int) -> F64:
         """Return the values of the first `episodes` episodes, float64 of shape (episodes,)."""
-        share = np.minimum(1.0, np.arange(episodes) / self.episodes)
+        share = np.minimum(1.0, np.arange(integer("episodes", episodes)) / self.episodes)
         return _between(self, self.episodes, self.start * (self.end / self.start) ** share)
 
 
@@ -159,6 +159,7 @@ def schedule_state(epsilon: Epsilon) -> F64:
     >>> float(schedule_state(0.1)[0])
     0.1
     """
+    epsilon = check_epsilon("epsilon", epsilon)
     if isinstance(epsilon, Linear):
         entries = (epsilon.start, epsilon.start, epsilon.end, epsilon.steps, 0.0, epsilon.start)
     elif isinstance(epsilon, HalfWay):
@@ -378,7 +379,7 @@ def values(parameter: float | Schedule, episodes: int) -> F64:
     """
     if isinstance(parameter, Schedule):
         return parameter.values(episodes)
-    return np.full(episodes, parameter, dtype=np.float64)
+    return np.full(integer("episodes", episodes), number("parameter", parameter))
 
 
 def parameter_of(name: str, value: object, check: Any) -> Any:

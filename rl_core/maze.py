@@ -144,7 +144,7 @@ class Maze(OwnModel, gym.Env[int, int]):
         options : dict, optional
             Not used.
         """
-        super().reset(seed=seed)
+        super().reset(seed=checks.optional("seed", seed, checks.integer))
         self._state = self.state(*self.start)
         return self._state, self._info(self._state, probability=1.0, slipped=False)
 

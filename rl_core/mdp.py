@@ -346,7 +346,7 @@ def _as_array(name: str, values: ArrayLike, dtype: type[np.generic], ndim: int) 
     allowed = f"an array of {what} with {ndim} axes"
     try:
         given = np.asarray(values)
-    except ValueError:
+    except (RuntimeError, TypeError, ValueError):  # ragged nesting, or what its own code raises
         raise ValueError(f"{name} must be {allowed}, got ragged lists") from None
     if given.dtype == np.object_ and dtype is np.float64:  # fractions
         given = checks.floats(name, values, (None,) * ndim)

@@ -15,6 +15,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from rl_core.checks import instance
 from rl_core.identity import imported
 from rl_core.kernels import networks
 from rl_core.kernels.arrays import F32, Arrays
@@ -172,10 +173,12 @@ def load_arrays(module: torch.nn.Module, arrays: Mapping[str, NDArray[Any]]) -> 
     --------
     >>> load_arrays(torch.nn.ReLU(), {})
     """
+    instance("module", module, torch.nn.Module, "a torch.nn.Module")
+    instance("arrays", arrays, Mapping, "a mapping of names to arrays")
     try:
         module.load_state_dict({name: torch.tensor(array) for name, array in arrays.items()})
-    except RuntimeError as error:
-        raise ValueError(f"weights must be those of the network: {error}") from error
+    except (AttributeError, RuntimeError, TypeError, ValueError) as error:
+        raise ValueError(f"arrays must be those of the module: {error}") from error
 
 
 class _Optimiser(torch.optim.Optimizer):

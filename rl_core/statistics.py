@@ -48,6 +48,7 @@ def iqm(values: ArrayLike, axis: int = 0) -> Any:
     3.5
     """
     values = _array("values", values, 1, 2)
+    axis = checks.integer("axis", axis, -values.ndim, values.ndim - 1)
     return _averaged("values", values, stats.trim_mean, 0.25, axis=axis)
 
 
@@ -307,10 +308,10 @@ def learning_curves(
     window = checks.integer("window", window, 1)
     checks.one_of("average", average, ("median", "mean"))
     checks.instance("table", table, pd.DataFrame, "a pandas.DataFrame")
+    checks.instance("column", column, str, "the name of a column")
     missing = {"seed", "episode", column} - set(table.columns)
-    checks.require(
-        not missing, "table", list(table.columns), f"with the columns {sorted(missing)} too"
-    )
+    allowed = f"with the columns {sorted(missing)} too, where column is {column!r}"
+    checks.require(not missing, "table", list(table.columns), allowed)
     checks.floats(column, table[column], (None,), finite=False)
     twice = table.duplicated(["seed", "episode"]).any()
     checks.require(not twice, "table", "several rows for a seed and episode", "of a single arm")
@@ -492,7 +493,7 @@ def _array(name: str, values: ArrayLike, *dimensions: int) -> F64:
     """Return numbers as float64, not empty; NaN stands for what is missing."""
     try:
         given = np.asarray(values)
-    except ValueError:  # ragged nesting
+    except (RuntimeError, TypeError, ValueError):  # ragged nesting, or what its own code raises
         given = np.empty((0, 0, 0))
     shape = (None,) * (given.ndim if given.ndim in dimensions else dimensions[-1])
     missing = pd.isna(given) if given.dtype.kind in "fO" else np.zeros(given.shape, bool)

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from rl_core.checks import distinct_seeds, instance, integer, integers
+from rl_core.checks import distinct_seeds, instance, integer, integers, require
 
 PROGRESS_EVERY = 10
 """Episodes between two reports of progress."""
@@ -91,7 +91,7 @@ def spawn_streams(seed: int) -> Streams:
     >>> bool(spawn_streams(0).policy.random() == spawn_streams(1).policy.random())
     False
     """
-    environment, *others = np.random.SeedSequence(seed).spawn(4)
+    environment, *others = np.random.SeedSequence(integer("seed", seed)).spawn(4)
     policy, network, replay = (np.random.default_rng(sequence) for sequence in others)
     return Streams(int(environment.generate_state(1)[0]), policy, network, replay)
 
@@ -218,6 +218,7 @@ def train_seeds(
     >>> len(run.table), run.arrays["weights"].shape
     (4, (2, 3))
     """
+    instance("train", train, Callable, "a function of a Training")
     seeds, episodes = distinct_seeds(seeds), integer("episodes", episodes, 1)
     snapshots = integers("snapshots", snapshots, 0, episodes)
     if progress is not None:
@@ -235,6 +236,8 @@ def train_seeds(
 
         training = Training(seed, episodes, snapshots, report)
         train(training)
+        allowed = "a function that keeps under '' what is learned at last"
+        require("" in training.kept, "train", train, allowed)
         done.append(training)
         report(episodes, training.env_steps)
     return Run(

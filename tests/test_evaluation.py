@@ -308,7 +308,7 @@ def test_weights_that_do_not_go_with_the_configuration_are_refused():
         as_learned(CONTINUOUS, None)
     with pytest.raises(ValueError, match=r"^weights must be with 'log_sigma', .*, got \['layer0"):
         as_learned(CONTINUOUS, PUMP)
-    with pytest.raises(ValueError, match=r"^layers must hold 'layer0\.weight'"):
+    with pytest.raises(ValueError, match=r"^weights must hold 'layer0\.weight'"):
         as_learned(ReinforceConfig(), {})
 
 

@@ -178,3 +178,17 @@ def test_rules_can_be_written_as_json_and_told_apart(rule):
     json.dumps(dataclasses.asdict(rule))
     assert describe(rule)["class"] == type(rule).__name__
     assert "kind" not in dataclasses.asdict(rule)
+
+
+@pytest.mark.parametrize(
+    "rule",
+    [
+        *(Linear(1, 0, episodes=2), Geometric(1, 0.5, 2), HalfWay(), VisitDecay(), Trials()),
+        *(EpsilonGreedy(), Softmax()),
+    ],
+)
+def test_rules_and_schedules_are_values(rule):
+    for field in dataclasses.fields(rule):
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            setattr(rule, field.name, 1)
+    assert hash(rule) == hash(dataclasses.replace(rule))

@@ -114,7 +114,7 @@ def test_arrays_come_back_under_the_modules_own_names_and_load_again():
 def test_arrays_of_another_network_are_refused(change):
     arrays = modules.as_arrays(made("make"))
     change(arrays)
-    with pytest.raises(ValueError, match=r"^weights must be those of the network: "):
+    with pytest.raises(ValueError, match=r"^arrays must be those of the module: "):
         modules.load_arrays(made("make"), arrays)
 
 

@@ -150,7 +150,7 @@ def test_pack_refuses_what_is_no_network(layers):
 
 def test_pack_refuses_layers_that_do_not_follow_each_other():
     layers = {"layer0.weight": np.ones((2, 3)), "layer1.weight": np.ones((4, 1))}
-    with pytest.raises(ValueError, match=r"layers must each take .* got \[\(2, 3\), \(4, 1\)\]"):
+    with pytest.raises(ValueError, match=r"weights must each take .* got \[\(2, 3\), \(4, 1\)\]"):
         networks.pack(layers)
 
 

@@ -28,7 +28,7 @@ import pandas as pd
 from joblib.externals.loky import get_reusable_executor
 from joblib.parallel import BACKENDS, EXTERNAL_BACKENDS
 
-from rl_core.checks import distinct_seeds, instance, integer, one_of, optional, require
+from rl_core.checks import distinct_seeds, instance, integer, one_of, optional, require, truth
 from rl_core.experiments.arms import Arm
 from rl_core.experiments.progress import Progress
 from rl_core.experiments.store import DamagedResultError, Store, Stored, scratch, sweep
@@ -154,6 +154,7 @@ def run(
     """
     arms, seeds = _checked_arms(arms), distinct_seeds(seeds)
     workers = optional("workers", workers, integer, 1) or joblib.cpu_count()
+    progress = truth("progress", progress)
     one_of("backend", backend, sorted({*BACKENDS, *EXTERNAL_BACKENDS}))
     instance("store", store, Store | Path | str, "a folder's path or a Store")
     identities = [arm.check() for arm in arms]

@@ -21,6 +21,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from rl_core.checks import instance
 from rl_core.kernels.arrays import F32, I64
 from rl_core.kernels.compiled import compiled
 
@@ -120,18 +121,19 @@ def pack(layers: Mapping[str, F32]) -> tuple[tuple[int, ...], F32]:
     >>> sizes, parameters.size
     ((2, 3), 9)
     """
+    instance("weights", layers, Mapping, "a mapping of names to arrays")
     weights: list[F32] = []
     while (name := f"layer{len(weights)}.weight") in layers:
         weights.append(np.asarray(layers[name]))
     if not weights or any(weight.ndim != 2 for weight in weights):
         raise ValueError(
-            "layers must hold 'layer0.weight', 'layer1.weight', ... of one network, each with two "
+            "weights must hold 'layer0.weight', 'layer1.weight', ... of one network, each with two "
             f"axes, got { ({name: np.shape(array) for name, array in layers.items()}) }"
         )
     sizes = (weights[0].shape[0], *(weight.shape[1] for weight in weights))
     shapes = [weight.shape for weight in weights]
     if shapes != list(pairwise(sizes)):
-        raise ValueError(f"layers must each take what the one before puts out, got {shapes}")
+        raise ValueError(f"weights must each take what the one before puts out, got {shapes}")
     parameters = np.zeros(count_parameters(sizes), np.float32)
     for name, view in unpack(sizes, parameters).items():
         if name in layers:

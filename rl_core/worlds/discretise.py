@@ -26,7 +26,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike
 
-from rl_core.checks import floats, instance, integer, integers, require
+from rl_core.checks import floats, instance, integer, integers, optional, require
 from rl_core.kernels.arrays import F32, F64, I64
 from rl_core.kernels.compiled import compiled
 from rl_core.worlds.environments import (
@@ -100,7 +100,7 @@ def make_grid(
     d = math.prod(space.shape)
     bounds = []
     for name, given, own in (("low", low, space.low), ("high", high, space.high)):
-        bound = floats(name, np.ravel(own if given is None else given), (d,), finite=False)
+        bound = floats(name, np.ravel(own) if given is None else given, (d,), finite=False)
         finite = bool(np.isfinite(bound).all())
         require(finite, name, bound.tolist(), "finite in every dimension; give bounds to use")
         bounds.append(bound)
@@ -253,15 +253,18 @@ class Discretised(gymnasium.Wrapper[Any, Any, Any, Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[int, dict[str, Any]]:
         """Begin an episode; see `gymnasium.Env.reset`."""
+        optional("options", options, instance, dict, "a dict")
+        seed = optional("seed", seed, integer)
         observation, info = self.env.reset(seed=seed, options=options)
         self._steps = 0
         return self._cell(observation), info
 
     def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
         """Take the action of this number; see `gymnasium.Env.step`."""
+        chosen = self.levels[integer("action", action, 0, len(self.levels) - 1)]
+        taken = native_action(self._native, chosen)
         self._steps += 1
-        native = native_action(self._native, self.levels[action])
-        observation, reward, terminated, truncated, info = self.env.step(native)
+        observation, reward, terminated, truncated, info = self.env.step(taken)
         reward = checked_reward(self._where(), reward)
         return self._cell(observation), reward, terminated, truncated, info
 

@@ -17,8 +17,10 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
+from numpy import copyto
 from numpy.typing import NDArray
 
+from rl_core.checks import distinct_seeds
 from rl_core.kernels.arrays import F32
 from rl_core.kernels.compiled import compiled, compiled_as
 from rl_core.worlds.names import Make, find, make_environment
@@ -29,6 +31,8 @@ EnvironmentLike = (
     str | Make | Task | gymnasium.Env[Any, Any] | Callable[[], gymnasium.Env[Any, Any]]
 )
 """An id, an id with arguments, an import path, a task, an environment, or a function making one."""
+
+_NO_NUMBERS: Any = None
 
 
 class TaskWorld:
@@ -93,6 +97,8 @@ class GymnasiumWorld:
         self.stepper = self
         self._environment = environment
         self._space, self._actions = observations, actions
+        # What is written as it came; -1: it has to be flattened first.
+        self._length = observations.shape[0] if len(observations.shape) == 1 else -1
         self._owned = owned
         self._seed: int | None = None
         self._steps = 0
@@ -112,10 +118,13 @@ class GymnasiumWorld:
         self._steps += 1
         native = native_action(self._actions, action)
         seen, reward, terminated, truncated, _ = self._environment.step(native)
-        following[:] = observed(self._space, seen, self).ravel()
-        # float(...) also of numpy's float64, which is a float, the quick way
-        paid = float(reward) if isinstance(reward, float) else checked_reward(self, reward)
-        return paid, bool(terminated), bool(truncated)
+        try:  # the quick way: numpy refuses other shapes, but for one number, and what is no number
+            copyto(following, seen if len(seen) == self._length else _NO_NUMBERS)
+        except (RuntimeError, TypeError, ValueError):
+            following[:] = observed(self._space, seen, self).ravel()
+        if type(reward) is not float:  # numpy's float64 is one, too
+            reward = float(reward) if isinstance(reward, float) else checked_reward(self, reward)
+        return reward, bool(terminated), bool(truncated)
 
     def __str__(self) -> str:
         name = self._environment.spec.id if self._environment.spec else self._environment
@@ -160,7 +169,7 @@ def observed(space: spaces.Space[Any], seen: Any, env: object) -> NDArray[Any]:
     """
     try:
         array = np.asarray(seen)
-    except ValueError:  # ragged
+    except (RuntimeError, TypeError, ValueError):  # ragged, or what its own code raises
         array = np.asarray(None)
     if array.shape != space.shape or array.dtype.kind not in "fiub":
         raise ValueError(
@@ -302,7 +311,7 @@ def opened(env: Any) -> gymnasium.Env[Any, Any]:
     return made
 
 
-def one_seed_of(env: object, seeds: Iterable[int]) -> Iterable[int]:
+def one_seed_of(env: object, seeds: Iterable[int]) -> tuple[int, ...]:
     """Return the seeds, unless there are several and the environment is ready made.
 
     What an environment or its wrappers remember would go from one seed to the next, and the seeds
@@ -319,10 +328,10 @@ def one_seed_of(env: object, seeds: Iterable[int]) -> Iterable[int]:
     Traceback (most recent call last):
     ValueError: env must be an id or a function that makes an environment where there are several...
     """
-    seeds = tuple(seeds) if isinstance(seeds, Iterable) else seeds
-    if isinstance(env, gymnasium.Env) and isinstance(seeds, tuple) and len(seeds) > 1:
+    found = distinct_seeds(seeds)
+    if isinstance(env, gymnasium.Env) and len(found) > 1:
         raise ValueError(
             "env must be an id or a function that makes an environment where there are several "
             f"seeds, which would share what one environment remembers, got {env!r}"
         )
-    return seeds
+    return found
