@@ -100,7 +100,7 @@ print(f"{model.n_states} states, {maze.reachable_states().sum()} of them reachab
 listing("rl_core.kernels.sweeps:lookahead", "One sweep:")
 
 # %% [markdown]
-# The reported settings in code, and its last three sweeps:
+# The reported settings in code, and the last three sweeps with them:
 
 # %%
 reported = {"gamma": 0.9, "threshold": 1e-5}

@@ -19,7 +19,8 @@ from studies import reinforce as study
 from studies.reinforce import DRAWN, EPISODES, Curves
 from studies.shared import shown_agents
 
-LONGEST = 400  # steps of a film
+LONGEST = 300  # steps of a film
+EVERY = 4  # steps from one of its pictures to the next
 LIMIT = {"Acrobot": 500, "MountainCar": 200}  # Gymnasium's own time limits, for orientation
 
 
@@ -163,9 +164,9 @@ def films(
         steps = len(episode.rewards)
         end = f"at the goal after {steps} steps" if episode.terminated else f"{steps} steps"
         name = text if seed is None else f"{text}, seed {seed}"
-        frames = _frames(env_id, episode, smaller=3)[:: 1 if steps < 40 else 3]
+        frames = _frames(env_id, episode, smaller=3)[::EVERY]
         said = f"{env_id}, {name}: {end}."
-        shelf[f"{name}: {end}"] = seed, Film(frames, frames_per_second=15, description=said)
+        shelf[f"{name}: {end}"] = seed, Film(frames, frames_per_second=12, description=said)
     return shelf
 
 
