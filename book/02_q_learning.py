@@ -130,10 +130,12 @@ print(f"{seconds:.0f} seconds of one core, when run")
 changed = replace(reported, step_size=1.0)
 arm = replace(study.FIGURE_9, name="changed", config=changed, snapshots=())
 few = run([arm], seeds=range(3), store=RESULTS / "store", progress=False)
+drawings.over_reported(study.curves(results, study.FIGURE_9, "error_norm"), few.table, "changed")
+
+# %% tags=["remove-cell"]
 offer(
     "figure_s2_9", few.table.loc[few.table["episode"] % 10 == 1, ["seed", "episode", "error_norm"]]
 )
-drawings.over_reported(study.curves(results, study.FIGURE_9, "error_norm"), few.table, "changed")
 
 # %% [markdown]
 # :::{container} caption
@@ -619,6 +621,9 @@ readings, best, others = fresh.readings(world, RESULTS / "store")
 others.to_csv(RESULTS / "q_learning_fresh.csv", index=False)
 findings = study.findings(world, found, study.levels(world, norms), readings)
 record(findings, RESULTS, chapter="2")
+captioned(verdicts(findings), "Table 2.4. The report's claims about Q-learning.")
+
+# %% tags=["remove-cell"]
 verdict = {finding.claim.id: finding.verdict for finding in findings}
 premise(
     "Claims 2d and 2i hold in part; 2a, 2c, 2e, 2f and 2h hold.",
@@ -641,8 +646,6 @@ glue("stuck_many", int((of_many["lost"] > 0.1).sum()), display=False)
 chance = multiplicity(findings)
 glue("criteria", chance.criteria, display=False)
 glue("by_chance", chance.by_chance, display=False)
-verdicts = verdicts(findings)
-captioned(verdicts, "Table 2.4. The report's claims about Q-learning.")
 
 # %% tags=["hide-input"]
 captioned(

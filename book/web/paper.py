@@ -49,9 +49,11 @@ STYLE = """
     td, th { overflow-wrap: break-word; white-space: normal !important; padding: 0.2em 0.4em; }
     """
 
-# A film becomes the picture in its middle, with a word on where it moves.
+# A film becomes the picture in its middle, with a word on where it moves; those of single seeds are
+# for the screen.
 STILLS = """
     async () => {
+      document.querySelectorAll('.play-films').forEach(it => it.remove());
       for (const film of document.querySelectorAll('video')) {
         await new Promise(done => {
           film.addEventListener('seeked', done, {once: true});
