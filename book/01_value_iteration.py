@@ -117,8 +117,9 @@ captioned(study.settings(maze), "Table S1.1. Every setting of this chapter.")
 # carries them one cell further back. Choose a cell to see the sum above with its numbers.
 
 # %% tags=["hide-input"]
-still = maze_drawings.situation_figure(maze, plan.Q, "")
-maze_widget(maze, maze_sweeps(maze, gamma=study.GAMMA, threshold=study.THRESHOLD), still=still)
+sweeps = maze_sweeps(maze, **reported)
+offer("interactive_s1_1", pd.DataFrame(sweeps.V).rename_axis("sweep").reset_index())
+maze_widget(maze, sweeps, still=maze_drawings.situation_figure(maze, plan.Q, ""))
 
 # %% [markdown]
 # :::{container} caption
@@ -126,6 +127,7 @@ maze_widget(maze, maze_sweeps(maze, gamma=study.GAMMA, threshold=study.THRESHOLD
 # **Interactive figure S1.1.** Values and best actions after each sweep, or each round of policy iteration. The
 # slider moves through them; a chosen cell shows its backup, both ways the floor may send the agent and the
 # largest of the four actions. Without scripts: situation 1 after the last sweep.
+# Data: {download}`values of all states after each sweep <../results/figures/interactive_s1_1.csv>`.
 # :::
 #
 # **Change one thing.** This cell is meant to be edited: replace a setting and run it. Here the discount is 0.99, so that what comes late counts for more.

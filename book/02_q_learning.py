@@ -305,6 +305,8 @@ glue("constant_above", float(final[study.FIGURE_9.name] - world.plateau), displa
 
 # %% tags=["hide-input"]
 log = learning_log(world.maze, reported, world.Q_star)
+episodes = np.arange(1, len(log.errors) + 1)
+offer("interactive_s2_1", pd.DataFrame({"episode": episodes, "error_norm": log.errors}))
 still = drawings.figure_9(world, norms, original, level)
 learning_widget(world.maze, log, world.Q_star, still=still)
 
@@ -313,6 +315,7 @@ learning_widget(world.maze, log, world.Q_star, still=still)
 # :name: interactive-s2-1
 # **Interactive figure S2.1.** Figure 9's settings, step by step: where the agent is, the update it makes, and the error of its table
 # so far. The states that cannot be reached are marked; their error stays. Without scripts: figure 9.
+# Data: {download}`CSV <../results/figures/interactive_s2_1.csv>`.
 # :::
 
 # %% tags=["hide-input"]

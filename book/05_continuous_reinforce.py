@@ -217,7 +217,7 @@ glue("film-steps", LONGEST, display=False)
 # curve of 2018, not smoothed. Data: {download}`CSV <../results/figures/figure_14.csv>`.
 # ```
 #
-# The films below each panel are of single seeds: the best, the one in the middle, the worst that learned and the first that did not, by their steps at the end; and the one in the middle
+# The films below the first panel are of single seeds: the best, the one in the middle, the worst that learned and the first that did not, by their steps at the end; and the one in the middle
 # before learning. They end after {glue:text}`film-steps` steps.
 #
 # {glue:text}`learned as reported` of {glue:text}`seeds` seeds learn, which is to say that they need a median of at most 500 steps in their last 100 episodes. With three features

@@ -437,8 +437,7 @@ def test_every_seed_of_a_figure_shows_the_rows_it_offers(desk, number):
             steps = rows[rows["seed"] == seed].dropna().set_index("episode")["steps"]
             there = steps.loc[drawn["episode"]].to_numpy()
             np.testing.assert_allclose(drawn["steps"], there, rtol=6e-4)
-        films = panel.locator("xpath=following-sibling::*[1]").locator("video")
-        assert films.count() >= 3
+    assert desk.page.locator(f"#figure-{number} .play-films video").count() >= 3
     assert desk.problems == []
 
 

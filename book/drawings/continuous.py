@@ -97,7 +97,7 @@ def learning_curves(curves: Curves, arms: Mapping[str, str], original: pd.DataFr
 def every_seed(
     curves: Curves, results: Results, arm: str, title: str, original: pd.DataFrame
 ) -> Widget:
-    """An arm's panel as a figure that answers, with films of single seeds below it."""
+    """An arm's panel as a figure that answers; with films of single seeds, if as reported."""
     smooth = curves.smooth[arm].copy()
     smooth[np.arange(1, EPISODES + 1) > curves.ends[arm][:, None]] = np.nan
     x = np.arange(EVERY, EPISODES + 1, EVERY)
@@ -110,7 +110,7 @@ def every_seed(
         tidy(x, {arm: smooth[:, x - 1]}, value="steps"),
         *(fates.of_each_seed(curves, results, arm), original),
         still=learning_curves(curves, {arm: title}, original),
-        films=films(ENV, agents),
+        films=films(ENV, agents) if arm == "as reported" else {},
         label=f"Learning curves of the seeds over the published curve, {title}.",
         title=title,
         median="learned",
