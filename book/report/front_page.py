@@ -274,8 +274,8 @@ def _picture(figure: Figure) -> str:
 
 def _card(number: str, page: str, figure: Figure, title: str, text: str) -> str:
     return (
-        f'<a class="thumbnail" href="{html.escape(page)}"><img src="{_picture(figure)}" '
-        f'alt="{html.escape(text)}"><span>{html.escape(number)}. {html.escape(title)}</span></a>'
+        f'<a class="thumbnail" href="{html.escape(page)}"><img loading="lazy" '
+        f'src="{_picture(figure)}" alt="{html.escape(text)}"><span>{html.escape(number)}. {html.escape(title)}</span></a>'
     )
 
 
