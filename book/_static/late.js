@@ -1,5 +1,5 @@
-// Formulas come last, when the page has been painted. A link lands again once all above its target has its
-// size, unless the reader has moved on.
+// Formulas come last, when the page has been painted. A link lands again once all above its target
+// has its size, unless the reader has moved on.
 (() => {
   let moved = false;
   for (const kind of ["wheel", "touchmove", "keydown", "pointerdown"])
@@ -18,6 +18,6 @@
   };
   addEventListener("load", () => {
     land();
-    requestAnimationFrame(() => setTimeout(set));
+    requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(set)));
   });
 })();

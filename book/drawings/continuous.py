@@ -47,20 +47,22 @@ from studies.continuous import (
 from studies.continuous_fates import FATES
 from studies.shared import shown_agents
 
-EVERY = 10  # episodes between drawn points
+EVERY = 10  # episodes between drawn points, after the first
+POINTS = (1, *range(EVERY, EPISODES + 1, EVERY))
 
 
 def curve_data(curves: Curves, arms: Sequence[str]) -> pd.DataFrame:
-    """What the curves are drawn from: each seed's median of the last 100 episodes, every tenth.
+    """What the curves are drawn from: each seed's median of the last 100 episodes.
 
-    A seed that its budget cut while it still got out keeps its last value, as in the medians drawn.
+    Of the points the first and every tenth. A seed that its budget cut while it still got out keeps
+    its last value, as in the medians drawn.
     """
     tables = []
     for arm in arms:
         good = dict(zip(SEEDS, curves.learned(arm), strict=True))
         smooth = pd.DataFrame(curves.smooth[arm].T, columns=list(SEEDS))
         smooth.insert(0, "episode", np.arange(1, EPISODES + 1))
-        drawn = smooth[smooth["episode"] % EVERY == 0]
+        drawn = smooth[smooth["episode"].isin(POINTS)]
         long = drawn.melt("episode", var_name="seed", value_name="steps").dropna()
         tables.append(long.assign(arm=arm, learned=long["seed"].map(good)))
     return pd.concat(tables, ignore_index=True)
@@ -100,7 +102,7 @@ def every_seed(
     """An arm's panel as a figure that answers; with films of single seeds, if as reported."""
     smooth = curves.smooth[arm].copy()
     smooth[np.arange(1, EPISODES + 1) > curves.ends[arm][:, None]] = np.nan
-    x = np.arange(EVERY, EPISODES + 1, EVERY)
+    x = np.array(POINTS)
     arrays, config = results.arrays(arm), study.config(arm)
     agents = shown_agents(
         fates.shown_seeds(curves, arm),
