@@ -97,7 +97,7 @@
         chip.setAttribute("aria-pressed", i === picked);
         chip.tabIndex = i === picked ? 0 : -1;
       });
-      said.textContent = `Seed ${it.seed}: ${it.fate}. ${it.steps_at_end == null ? "No steps" : `${brief(it.steps_at_end)} steps`} at the end; ${grouped(it.env_steps)} environment steps used.`;
+      said.textContent = `Seed ${it.seed}: ${it.fate}. ${it.steps_at_end == null ? "Stopped before the end" : `${brief(it.steps_at_end)} steps at the end`}; ${grouped(it.env_steps)} environment steps used.`;
       const rows = data.episode.map((episode, j) => `${it.seed},${episode},${it.steps[j] ?? ""}`);
       csv.href = `data:text/csv;charset=utf-8,${encodeURIComponent(["seed,episode,steps", ...rows, ""].join("\n"))}`;
       csv.download = `seed_${it.seed}.csv`;
