@@ -97,3 +97,15 @@ def test_of_the_styles_only_what_can_be_used_stays():
     assert left.startswith("p:not(.nowhere) > .a{")
     assert "@font-face { font-family: x }" in left
     assert '.b-c:is(.nowhere, .a),.w-1\\/2{ content: ".nowhere { }" }' in left
+
+
+def test_a_link_to_a_caption_leads_to_what_stands_above_it():
+    output = nodes.container(classes=["cell_output"])
+    cell = nodes.container("", output, classes=["cell"])
+    caption = nodes.container(classes=["caption"], ids=["figure-s1-1"])
+    other = nodes.container(classes=["caption"], ids=["figure-s1-2"])
+    page = nodes.section("", cell, caption, nodes.paragraph(), other)
+    website.land_on_pictures(None, page, "")
+    assert output["ids"] == ["figure-s1-1"]
+    assert caption["ids"] == []
+    assert other["ids"] == ["figure-s1-2"]

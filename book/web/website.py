@@ -65,6 +65,19 @@ def describe(
         context["metatags"] = context.get("metatags", "") + tag
 
 
+def land_on_pictures(_app: Sphinx, doctree: nodes.document, _page: str) -> None:
+    """Let the address of a caption be that of what stands above it: a link shows both."""
+    for caption in list(doctree.findall(nodes.container)):
+        above = caption.previous_sibling()
+        if "caption" in caption["classes"] and isinstance(above, nodes.container):
+            outputs = [
+                it for it in above.findall(nodes.container) if "cell_output" in it["classes"]
+            ]
+            if outputs:
+                outputs[0]["ids"] += caption["ids"]
+                caption["ids"] = []
+
+
 def is_formula(node: nodes.Node) -> bool:
     """Whether it is one in a line or on a line of its own."""
     return isinstance(node, nodes.math | nodes.math_block)
@@ -184,6 +197,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("config-inited", announce)
     app.connect("builder-inited", without_thebe)
     app.connect("builder-inited", lambda app: app.set_html_assets_policy("per_page"))
+    app.connect("doctree-resolved", land_on_pictures)
     app.connect("html-page-context", describe, priority=900)
     app.connect("build-finished", lighten, priority=900)  # when all files are where they belong
     app.add_css_file("icons.css")
