@@ -65,7 +65,7 @@ RESULTS.mkdir(exist_ok=True)
 # only on paper: nobody can stand on flag A without holding flag A.
 
 # %%
-maze = Maze()
+maze = Maze(slip=0.1)
 model = maze.model()
 print(maze.layout)
 print(f"{model.n_states} states, {maze.reachable_states().sum()} of them reachable")
@@ -99,18 +99,27 @@ print(f"{model.n_states} states, {maze.reachable_states().sum()} of them reachab
 # %% tags=["hide-input"]
 listing("rl_core.kernels.sweeps:lookahead", "One sweep:")
 
+# %% [markdown]
+# The reported settings in code, and the last three sweeps with them:
+
 # %%
-plan = q_value_iteration(model, gamma=study.GAMMA, threshold=study.THRESHOLD)
-exact = value_iteration(model, gamma=study.GAMMA, tolerance=1e-10)
+reported = {"gamma": 0.9, "threshold": 1e-5}
+assert reported == {"gamma": study.GAMMA, "threshold": study.THRESHOLD}
+plan = q_value_iteration(model, **reported)
+exact = value_iteration(model, gamma=reported["gamma"], tolerance=study.EXACT)
 plan.table.tail(3)
+
+# %% tags=["hide-input"]
+captioned(study.settings(maze), "Table S1.1. Every setting of this chapter.")
 
 # %% [markdown]
 # Watch the sweeps. Before the first, the table is zero. Then the rewards at the goal appear, and each sweep
 # carries them one cell further back. Choose a cell to see the sum above with its numbers.
 
 # %% tags=["hide-input"]
-still = maze_drawings.situation_figure(maze, plan.Q, "")
-maze_widget(maze, maze_sweeps(maze, gamma=study.GAMMA, threshold=study.THRESHOLD), still=still)
+sweeps = maze_sweeps(maze, **reported)
+offer("interactive_s1_1", pd.DataFrame(sweeps.V).rename_axis("sweep").reset_index())
+maze_widget(maze, sweeps, still=maze_drawings.situation_figure(maze, plan.Q, ""))
 
 # %% [markdown]
 # :::{container} caption
@@ -118,6 +127,25 @@ maze_widget(maze, maze_sweeps(maze, gamma=study.GAMMA, threshold=study.THRESHOLD
 # **Interactive figure S1.1.** Values and best actions after each sweep, or each round of policy iteration. The
 # slider moves through them; a chosen cell shows its backup, both ways the floor may send the agent and the
 # largest of the four actions. Without scripts: situation 1 after the last sweep.
+# Data: {download}`values of all states after each sweep <../results/figures/interactive_s1_1.csv>`.
+# :::
+#
+# **Change one thing.** This cell is meant to be edited: replace a setting and run it. Here the discount is 0.99, so that what comes late counts for more.
+# Look at the way the agent then takes, without a slip.
+
+# %% mystnb={"image": {"alt": "The largest change of each sweep falls steeply with the reported settings, and more slowly with the changed one."}}
+changed = q_value_iteration(model, **(reported | {"gamma": 0.99}))
+for name, policy in {"reported": plan.policy, "changed": changed.policy}.items():
+    moves = maze_drawings.follow_policy(Maze(slip=0), policy, seed=0)
+    print(f"{name}: {study.route(maze, moves)}")
+tables = {"as reported": plan.table, "changed": changed.table}
+offer("figure_s1_4", pd.concat(tables, names=["settings"]).reset_index("settings"))
+drawings.over_reported(tables, reported["threshold"])
+
+# %% [markdown]
+# :::{container} caption
+# :name: figure-s1-4
+# **Figure S1.4.** The largest change of each sweep, with one setting changed. Data: {download}`CSV <../results/figures/figure_s1_4.csv>`.
 # :::
 #
 # ## The eight situations

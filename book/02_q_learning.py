@@ -25,6 +25,7 @@
 # exploration survive {glue:text}`seeds` seeds instead of one?
 
 # %% tags=["hide-input"]
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -122,6 +123,26 @@ print(f"{steps:.0f} million steps")
 print(f"{seconds:.0f} seconds of one core, when run")
 
 # %% [markdown]
+# **Change one thing.** This cell is meant to be edited: replace a setting and run it, only this arm is trained anew. Here the step size is 1, so that
+# an entry forgets all but its latest sample.
+
+# %% mystnb={"image": {"alt": "The error of three seeds with the changed setting, over that of all seeds as reported."}}
+changed = replace(reported, step_size=1.0)
+arm = replace(study.FIGURE_9, name="changed", config=changed, snapshots=())
+few = run([arm], seeds=range(3), store=RESULTS / "store", progress=False)
+drawings.over_reported(study.curves(results, study.FIGURE_9, "error_norm"), few.table, "changed")
+
+# %% tags=["remove-cell"]
+offer(
+    "figure_s2_9", few.table.loc[few.table["episode"] % 10 == 1, ["seed", "episode", "error_norm"]]
+)
+
+# %% [markdown]
+# :::{container} caption
+# :name: figure-s2-9
+# **Figure S2.9.** The error of three seeds with one setting changed, over all seeds as reported. Data: {download}`CSV <../results/figures/figure_s2_9.csv>`.
+# :::
+#
 # ## The report's figure 9
 
 # %% tags=["remove-cell"]
@@ -284,6 +305,8 @@ glue("constant_above", float(final[study.FIGURE_9.name] - world.plateau), displa
 
 # %% tags=["hide-input"]
 log = learning_log(world.maze, reported, world.Q_star)
+episodes = np.arange(1, len(log.errors) + 1)
+offer("interactive_s2_1", pd.DataFrame({"episode": episodes, "error_norm": log.errors}))
 still = drawings.figure_9(world, norms, original, level)
 learning_widget(world.maze, log, world.Q_star, still=still)
 
@@ -292,6 +315,7 @@ learning_widget(world.maze, log, world.Q_star, still=still)
 # :name: interactive-s2-1
 # **Interactive figure S2.1.** Figure 9's settings, step by step: where the agent is, the update it makes, and the error of its table
 # so far. The states that cannot be reached are marked; their error stays. Without scripts: figure 9.
+# Data: {download}`CSV <../results/figures/interactive_s2_1.csv>`.
 # :::
 
 # %% tags=["hide-input"]
@@ -365,7 +389,7 @@ drawings.courses(every + 1, {("error of Q", "RMSE, visitable entries"): courses}
 # fast and restless, 0.02 calm and late. Data: {download}`CSV <../results/figures/figure_s2_4.csv>`.
 # :::
 
-# %% tags=["hide-input"] mystnb={"image": {"alt": "Four charts against the step size: the error at the end is smallest at 0.1 and rises on both sides; all entries are visited; what is earned hardly changes; the greedy policy loses value only from 0.5 on."}}
+# %% tags=["hide-input"]
 swept = study.swept(world, found, by_step_size, "step_size")
 lost = {x: swept.loc[swept["step_size"] == x, "lost"] for x in (0.5, 0.9)}
 glue("stuck_large", int((lost[0.9] > 10).sum()), display=False)
@@ -373,8 +397,9 @@ glue("lost_large", float(lost[0.9].median()), display=False)
 glue("lost_half", float(lost[0.5].median()), display=False)
 glue("lost_half_quartile", float(lost[0.5].quantile(0.75)), display=False)
 offer("figure_s2_5", swept)
-drawings.sweep(
+drawings.turning(
     swept,
+    study.errors(results, study.BY_STEP_SIZE),
     x="step size α (logarithmic)",
     ticks=[0.02, 0.05, 0.15, 0.3, 0.9],
     log=True,
@@ -383,7 +408,7 @@ drawings.sweep(
 # %% [markdown]
 # :::{container} caption
 # :name: figure-s2-5
-# **Figure S2.5.** What the step size does (dots: seeds; line: median; band: 95%). Error: mean of the last 500 episodes. Earned:
+# **Figure S2.5.** What the step size does (dots: seeds; line: median; band: 95%). On a screen a slider turns it, over the error's whole course. Error: mean of the last 500 episodes. Earned:
 # discounted return of the last 1,000 training episodes, as a share of the optimum $v_*(s_0)$ (note the scale). Lost: by
 # following the greedy policy after 5,000 episodes. Data: {download}`CSV <../results/figures/figure_s2_5.csv>`.
 # :::
@@ -399,13 +424,14 @@ drawings.sweep(
 #
 # The report: exploit with probability 0.8 to 0.9 to do well, with 0.1 to 0.2 to learn well.
 
-# %% tags=["hide-input"] mystnb={"image": {"alt": "Four charts against the exploitation probability: the error and the share of entries never visited against what is earned while learning, and what the greedy policy loses."}}
+# %% tags=["hide-input"]
 swept = study.swept(
     world, found, {x: arm.name for x, arm in study.BY_EXPLOITATION.items()}, "exploitation"
 )
 offer("figure_s2_6", swept)
-drawings.sweep(
+drawings.turning(
     swept,
+    study.errors(results, study.BY_EXPLOITATION),
     x="exploitation probability",
     ticks=[0.1, 0.3, 0.5, 0.7, 0.9],
     log=False,
@@ -458,13 +484,14 @@ glue("stuck_rising", int(stuck[study.RISES]), display=False)
 #
 # The report: softmax visits less diversely and gets less close to $q_*$.
 
-# %% tags=["hide-input"] mystnb={"image": {"alt": "Four charts against the temperature of softmax: below 0.5 the error is high and entries stay unvisited, from 1 on the error is as low as with epsilon-greedy exploration."}}
+# %% tags=["hide-input"]
 swept = study.swept(
     world, found, {x: arm.name for x, arm in study.BY_TEMPERATURE.items()}, "temperature"
 )
 offer("figure_s2_7", swept)
-drawings.sweep(
+drawings.turning(
     swept,
+    study.errors(results, study.BY_TEMPERATURE),
     x="temperature T (logarithmic)",
     ticks=[0.02, 0.1, 0.5, 1, 5],
     log=True,
@@ -597,6 +624,9 @@ readings, best, others = fresh.readings(world, RESULTS / "store")
 others.to_csv(RESULTS / "q_learning_fresh.csv", index=False)
 findings = study.findings(world, found, study.levels(world, norms), readings)
 record(findings, RESULTS, chapter="2")
+captioned(verdicts(findings), "Table 2.4. The report's claims about Q-learning.")
+
+# %% tags=["remove-cell"]
 verdict = {finding.claim.id: finding.verdict for finding in findings}
 premise(
     "Claims 2d and 2i hold in part; 2a, 2c, 2e, 2f and 2h hold.",
@@ -619,8 +649,6 @@ glue("stuck_many", int((of_many["lost"] > 0.1).sum()), display=False)
 chance = multiplicity(findings)
 glue("criteria", chance.criteria, display=False)
 glue("by_chance", chance.by_chance, display=False)
-verdicts = verdicts(findings)
-captioned(verdicts, "Table 2.4. The report's claims about Q-learning.")
 
 # %% tags=["hide-input"]
 captioned(

@@ -38,11 +38,9 @@ from report.claims import details, record, verdicts, what_it_would_take
 from report.figure_data import offer
 from report.listings import listing
 from report.seeds import premise
-from rl_core.evaluation import as_learned, rollout
 from rl_core.experiments import Arm, run
 from rl_core.policies import MLP, Categorical
 from rl_core.reinforce import ReinforceConfig, reinforce
-from rl_core.training import weights_of
 from studies import reinforce as study
 
 look.use_style()
@@ -211,7 +209,7 @@ drawings.over_reported(
 # %% tags=["hide-input"]
 for number, name, file in ((10, "Acrobot", "acrobot"), (11, "MountainCar", "mountaincar")):
     original = pd.read_csv(ORIGINAL / f"figure_{number}_{file}_reinforce.csv")
-    figure = drawings.learning_curve(curves, f"{name}, as reported", original)
+    figure = drawings.every_seed(curves, results, name, original)
     glue(f"fig-{number}", figure, display=False)
     offer(f"figure_{number}", curves.rows([f"{name}, as reported"]))
     around = original[(original["episode"] - study.REPORTED_AT[name]).abs() < 50]
@@ -228,6 +226,8 @@ for number, name, file in ((10, "Acrobot", "acrobot"), (11, "MountainCar", "moun
         count = int(curves.learned(f"{name}, {variant}").sum())
         glue(f"{file}-{variant.replace(' ', '-')}", count, display=False)
 
+glue("film-steps", drawings.LONGEST, display=False)
+
 # %% [markdown]
 # ```{glue:figure} fig-10
 # :name: figure-10
@@ -235,8 +235,11 @@ for number, name, file in ((10, "Acrobot", "acrobot"), (11, "MountainCar", "moun
 #
 # Learning curve for Acrobot-v1 using REINFORCE. Each thin line is a seed (median of its last 100
 # episodes), the strong line their median, the band its 95% interval; behind them the curve of
-# 2018, which is not smoothed. Dotted: seeds that did not learn. Data: {download}`CSV <../results/figures/figure_10.csv>`.
+# 2018, which is not smoothed. Dotted or dashed: seeds that did not learn. Data: {download}`CSV <../results/figures/figure_10.csv>`.
 # ```
+#
+# Point at a line, or choose a seed, to see what became of it. Below are films of single seeds, chosen by a rule: the best, the one in the middle when all are ordered by
+# their steps at the end, the worst that learned and the first that did not, and the one in the middle before it had learned anything. A film ends after {glue:text}`film-steps` steps.
 #
 # {glue:text}`acrobot-as-reported` of {glue:text}`seeds` seeds learn (at most 500 steps in the last 100 episodes). The others ran
 # out of budget. They spend it on episodes that do not end within 5,000 steps; these are stopped and thrown away, so nothing is
@@ -300,14 +303,14 @@ drawings.variants(curves, "MountainCar", names)
 # %% tags=["hide-input"]
 milestones = study.milestones(results.table, curves)
 milestones.to_csv(RESULTS / "reinforce_milestones.csv", index=False)
+count = curves.learned("MountainCar, gamma 0.9").sum()
+premise("γ = 0.9 fails on MountainCar", count <= len(study.SEEDS) / 10)
 captioned(
     milestones,
     "Table 3.3. Steps an episode at the report's milestones (each seed's median over the last 100 "
     f"episodes; median over {len(study.SEEDS)} seeds [95% interval]; ∞: more than half of the seeds had stopped). "
     "Against as reported: steps more than the same seed needs there, median.",
 )
-count = curves.learned("MountainCar, gamma 0.9").sum()
-premise("γ = 0.9 fails on MountainCar", count <= len(study.SEEDS) / 10)
 
 # %% [markdown]
 # The rows of Table 3.3 are offered as {download}`reinforce_milestones.csv <../results/reinforce_milestones.csv>`. Its column "against as reported" compares
@@ -417,44 +420,6 @@ captioned(
 #
 # **Step size and discount.** A bad step size could pass for a bad discount. On Acrobot we gave $\gamma = 0.9$ two other step sizes, 0.0003 and 0.003, and a million
 # steps. {glue:text}`small-step` and {glue:text}`large-step` of {glue:text}`seeds` seeds learned.
-#
-# ## Films: the best seed, the middle, the worst, and one that failed
-
-
-# %% tags=["hide-input"]
-def film(name, env_id):
-    arm = f"{name}, as reported"
-    config = next(a.config for a in study.arms() if a.name == arm)
-    arrays = results.arrays(arm)
-    places = study.shown_seeds(curves, arm)
-    episodes = {}
-    for text, place in places.items():
-        agent = as_learned(config, weights_of(arrays, place))
-        title = f"{text} ({study.SEEDS[place]})"
-        episodes[title] = rollout(env_id, agent, np.random.default_rng(0), 600)
-    untrained = as_learned(config, weights_of(arrays, places["middle"], "initial/"))
-    before = rollout(env_id, untrained, np.random.default_rng(0), 600)
-    text = f"{name}: the middle seed before learning, and after it " + ", ".join(episodes)
-    return drawings.side_by_side(env_id, {"before": before, **episodes}, text, smaller=4)
-
-
-film("Acrobot", "Acrobot-v1")
-
-# %% [markdown]
-# :::{container} caption
-# :name: film-s3-1
-# **Film S3.1.** Acrobot before learning (left) and after: the best seed, the one in the middle when all {glue:text}`seeds` are ordered by their steps at the end,
-# the worst that learned and the first that did not. In brackets the seed. An episode that is over stands still; after 600 steps the film ends.
-# :::
-
-# %% tags=["hide-input"]
-film("MountainCar", "MountainCar-v0")
-
-# %% [markdown]
-# :::{container} caption
-# :name: film-s3-2
-# **Film S3.2.** MountainCar, shown as Acrobot. The trained cars rock themselves up to the flag.
-# :::
 #
 # ## How long it took
 

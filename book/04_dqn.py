@@ -33,7 +33,6 @@ from scipy.stats import fisher_exact
 
 from drawings import dqn as drawings
 from drawings import look
-from drawings.reinforce import before_and_after
 from report import provenance, settings
 from report.captions import captioned
 from report.claims import details, record, verdicts, what_it_would_take
@@ -152,7 +151,8 @@ curves = study.Curves(results.table)
 # %% tags=["hide-input"]
 for number, name, file in ((12, "Acrobot", "acrobot"), (13, "MountainCar", "mountaincar")):
     original = pd.read_csv(ORIGINAL / f"figure_{number}_{file}_dqn.csv")
-    glue(f"fig-{number}", drawings.learning_curve(curves, name, original), display=False)
+    figure = drawings.every_seed(curves, results, name, original)
+    glue(f"fig-{number}", figure, display=False)
     offer(f"figure_{number}", curves.table[f"{name}, as reported"])
     around = original[(original["episode"] - 20).abs() <= 5]
     for edge in ("low", "high"):
@@ -177,6 +177,9 @@ for number, name, file in ((12, "Acrobot", "acrobot"), (13, "MountainCar", "moun
 #
 # Learning curve for MountainCar-v0 using DQN with the shaped reward, drawn as Figure 12. Data: {download}`CSV <../results/figures/figure_13.csv>`.
 # ```
+#
+# The films below the figures are of single seeds: the best, the one in the middle, the worst that learned and the first that did not, by their steps at the end, as trained, one
+# action in ten at random; and the one in the middle before learning, nine in ten at random.
 #
 # After 20 episodes the median seed takes {glue:text}`acrobot-at-20:.0f` steps on Acrobot (the text of the report says 80, its figure shows about
 # {glue:text}`acrobot-low:.0f`) and {glue:text}`mountaincar-at-20:.0f` on MountainCar (text 140, figure about {glue:text}`mountaincar-low:.0f`); after 100 episodes
@@ -562,45 +565,6 @@ drawings.state_plane(policies)
 # :name: figure-s4-4
 # **Figure S4.4.** MountainCar: values (left) and greedy push (right). The line is one greedy episode from its start (dot), at most 1,000 steps; dotted:
 # the flag. Without biases (top) all lines of equal push run through the origin, as they must. Data: {download}`CSV <../results/figures/figure_s4_4.csv>`.
-# :::
-#
-# ## Before and after
-
-
-# %% tags=["hide-input"]
-def film(name, text):
-    arm = f"{name}, as reported"
-    position, arrays = study.median_seed(curves, arm), results.arrays(arm)
-    trained, untrained = (weights_of(arrays, position, moment) for moment in ("", "initial/"))
-    # The trained agent acts as it did at the end of its training, one action in ten at random.
-    after = rollout(study.ENV[name], of_values(trained, 0.1), np.random.default_rng(0), 1_000)
-    long = len(after.rewards)
-    before = rollout(study.ENV[name], of_values(untrained, 0.9), np.random.default_rng(0), long)
-    glue(f"{name}-seed", study.SEEDS[position], display=False)
-    return before_and_after(study.ENV[name], before, after, description=text)
-
-
-film(
-    "Acrobot",
-    "Acrobot before and after learning with DQN: first it dangles, then it swings its tip over the line.",
-)
-
-# %% [markdown]
-# :::{container} caption
-# :name: film-s4-1
-# **Film S4.1.** Acrobot before learning (left: initial weights, nine actions in ten at random) and after 100 episodes (right: one in ten), seed {glue:text}`Acrobot-seed`, the one in the middle.
-# :::
-
-# %% tags=["hide-input"]
-film(
-    "MountainCar",
-    "MountainCar before and after learning with DQN: first it jitters in the valley, then it rocks itself up to the flag.",
-)
-
-# %% [markdown]
-# :::{container} caption
-# :name: film-s4-2
-# **Film S4.2.** MountainCar before and after learning, as Film S4.1, seed {glue:text}`MountainCar-seed`.
 # :::
 #
 # ## How long it took

@@ -28,19 +28,19 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from IPython.display import HTML
 from myst_nb import glue
 from scipy.stats import fisher_exact
 
 from drawings import continuous as drawings
 from drawings import look
-from drawings.reinforce import before_and_after
+from drawings.reinforce import LONGEST
 from report import provenance, settings
 from report.captions import captioned
 from report.claims import details, record, sensitivity, verdicts, what_it_would_take
 from report.figure_data import offer
 from report.listings import listing
 from report.seeds import SEEDS, premise
-from rl_core.evaluation import as_learned, rollout
 from rl_core.experiments import Arm, run
 from rl_core.policies import MLP, Gaussian
 from rl_core.reinforce import ReinforceConfig, reinforce
@@ -165,7 +165,7 @@ glue("parted", parted, display=False)
 for engine, taken in seconds.items():
     glue(f"seconds {engine}", f"{taken:.1f}", display=False)
 premise("the two part", parted > 1)
-offer("figure_s5_7", same_seed.table[["arm", "seed", "episode", "steps"]])
+offer("figure_s5_7", pd.concat(same_seed.values())[["arm", "seed", "episode", "steps"]])
 drawings.engines(same_seed)
 
 # %% [markdown]
@@ -187,7 +187,8 @@ readings = {
     "as reported": "two observations (as reported)",
     "three features": "two observations and a constant (three features)",
 }
-glue("fig-14", drawings.learning_curves(curves, readings, original), display=False)
+panels = (drawings.every_seed(curves, results, *each, original) for each in readings.items())
+glue("fig-14", HTML("".join(panel._repr_html_() for panel in panels)), display=False)
 data = drawings.curve_data(curves, list(readings))
 data.to_csv(RESULTS / "figures" / "figure_14.csv", index=False)
 around = original[(original["episode"] - 3_000).abs() < 50]
@@ -202,6 +203,7 @@ glue("late", int(sum(map(np.sum, late.values()))), display=False)
 moved = [f"{seeds.sum()} in “{arm}”" for arm, seeds in late.items() if seeds.any()]
 glue("moved", ", ".join(moved) or "none", display=False)
 glue("seeds", len(SEEDS), display=False)
+glue("film-steps", LONGEST, display=False)
 
 # %% [markdown]
 # ```{glue:figure} fig-14
@@ -214,6 +216,9 @@ glue("seeds", len(SEEDS), display=False)
 # or the budget ran out while the car still got out. Behind them the
 # curve of 2018, not smoothed. Data: {download}`CSV <../results/figures/figure_14.csv>`.
 # ```
+#
+# The films below the first panel are of single seeds: the best, the one in the middle, the worst that learned and the first that did not, by their steps at the end; and the one in the middle
+# before learning. They end after {glue:text}`film-steps` steps.
 #
 # {glue:text}`learned as reported` of {glue:text}`seeds` seeds learn, which is to say that they need a median of at most 500 steps in their last 100 episodes. With three features
 # {glue:text}`learned three features` do. The report's text says about 200 steps after 3,000 episodes; its own figure runs between {glue:text}`original-low:.0f` and
@@ -394,6 +399,16 @@ drawings.tradeoff(tradeoff)
 # :::
 
 # %% tags=["hide-input"]
+drawings.sigma_knob(curves, tradeoff)
+
+# %% [markdown]
+# :::{container} caption
+# :name: interactive-s5-1
+# **Interactive figure S5.1.** One σ at a time, two observations: the median of the seeds that learned with its 95% interval, and four measures of Figure S5.3 with the same σ marked.
+# Without scripts: all three medians. Data: {download}`CSV <../results/figures/figure_s5_3.csv>`.
+# :::
+
+# %% tags=["hide-input"]
 captioned(
     study.tradeoff_text(tradeoff),
     "Table 5.2. The numbers of Figure S5.3: estimate [95% interval].",
@@ -499,7 +514,7 @@ drawings.variants(curves, names)
 #
 # ## The mean action
 
-# %% tags=["hide-input"] mystnb={"image": {"alt": "Maps of the mean action over position and velocity at four moments of learning, and for a seed that failed."}}
+# %% tags=["hide-input"]
 arm, failing = "as reported", "gamma 0.9"
 arrays, others = results.arrays(arm), results.arrays(failing)
 good, lost = study.median_seed(curves, arm), what_became.first_not_learned(curves, failing)
@@ -509,40 +524,20 @@ agents = {f"γ = 0.99, {text}": weights_of(arrays, good, moment) for text, momen
 for text, moment in {"before": "initial/", "at its end": ""}.items():
     agents[f"γ = 0.9, {text}"] = weights_of(others, lost, moment)
 picture, data = drawings.mean_action_maps(study.config(arm), agents)
-data.to_csv(RESULTS / "figures" / "figure_s5_5.csv", index=False)
+offer("figure_s5_5", data)
 glue("good-seed", SEEDS[good], display=False)
 glue("lost-seed", SEEDS[lost], display=False)
-picture
+drawings.mean_action_snapshots(study.config(arm), agents, picture)
 
 # %% [markdown]
 # :::{container} caption
 # :name: figure-s5-5
-# **Figure S5.5.** The mean action over the state plane; orange is left, purple right. First two rows, the reported settings: seed {glue:text}`good-seed`, the one in the middle of those that learned, by its steps at the end.
-# Last row, γ = 0.9: seed {glue:text}`lost-seed`, the first that got out and did not learn. Black: where the mean changes sign. Dotted: the bottom of the valley.
+# **Figure S5.5.** The mean action over the state plane; orange is left, purple right. With γ = 0.99, the reported settings: seed {glue:text}`good-seed`, the one in the middle of those that learned, by its steps at the end.
+# With γ = 0.9: seed {glue:text}`lost-seed`, the first that got out and did not learn. Black: where the mean changes sign. Dotted: the bottom of the valley.
 # Data: {download}`CSV <../results/figures/figure_s5_5.csv>`.
 # :::
 #
 # Where a line of no force is drawn, it is a ray from the origin $(0, 0)$, as the formula above demands. What serves is a force of the sign of the velocity: one colour above, the other below.
-#
-# ## Before and after
-
-# %% tags=["hide-input"]
-trained, untrained = (weights_of(arrays, good, moment) for moment in ("", "initial/"))
-after, before = as_learned(study.config(arm), trained), as_learned(study.config(arm), untrained)
-after = rollout(study.ENV, after, np.random.default_rng(0), 1_000)
-before = rollout(study.ENV, before, np.random.default_rng(0), len(after.rewards))
-before_and_after(
-    study.ENV,
-    before,
-    after,
-    description="MountainCarContinuous before and after learning: first the car trembles at the bottom of the valley, then it rocks itself up to the flag.",
-)
-
-# %% [markdown]
-# :::{container} caption
-# :name: film-s5-1
-# **Film S5.1.** Before learning (left) and after (right), for as long as the trained agent needs. Seed {glue:text}`good-seed`, the same as in Figure S5.5.
-# :::
 #
 # ## How long it took
 

@@ -5,17 +5,20 @@ installed already; `CHROMIUM` names another one.
 """
 
 import os
+import re
 import threading
 import time
 from collections.abc import Iterator
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from io import StringIO
 from pathlib import Path
-from urllib.parse import urldefrag
+from urllib.parse import unquote, urldefrag, urljoin
 
+import numpy as np
 import pandas as pd
 import pytest
-from playwright.sync_api import Browser, Page, Route
+from playwright.sync_api import Browser, Locator, Page, Route
 
 from web.chromium import NoBrowserError, open_browser
 
@@ -96,7 +99,7 @@ class Visit:
         self.problems.clear()
         self.page.goto(f"{self.address}/{path}", wait_until="networkidle")
         self.page.wait_for_function(
-            "() => !window.MathJax || MathJax.startup.promise.then(() => true)"
+            "() => !window.MathJax || MathJax.startup?.promise?.then(() => true)"
         )
         return self
 
@@ -150,6 +153,7 @@ def test_pictures_are_there_and_described(visit):
         """
         const broken = [];
         for (const image of article.querySelectorAll('img')) {
+          image.loading = 'eager';  // even what stands in for a figure that answers
           await image.decode().catch(() => {});
           if (image.naturalWidth === 0) broken.push(`not shown: ${image.src}`);
           if (!image.alt.trim() || /^[_.]*\\/?_images\\//.test(image.alt))
@@ -300,13 +304,14 @@ def targets(page: Page) -> list[str]:
 
 @pytest.mark.parametrize("name", ["desk light", "phone light"])
 def test_a_link_from_the_front_page_lands_on_its_figure(browser, address, name):
-    """Also if pictures are slow: what comes above the target must not push it away."""
+    """Also if pictures and formulas are slow: what comes above must not push the target away."""
     with browser.new_context(**VIEWS[name]) as context:
         page = context.new_page()
         visit = Visit(page, address).go("book/intro.html")
         links = targets(page)
         assert len(links) > 6
-        page.route("**/*.png", lambda route: (time.sleep(0.05), route.continue_()))
+        for these, seconds in (("**/*.png", 0.05), ("**/mathjax/**", 0.3)):
+            page.route(these, lambda route, s=seconds: (time.sleep(s), route.continue_()))
         missed = {}
         for link in links:
             visit.go(link.removeprefix(f"{address}/"))
@@ -383,6 +388,124 @@ CONTRAST = """
 def test_text_stands_out_from_its_ground(view, path):
     """At least 4.5 to 1, the Web Content Accessibility Guidelines' level AA."""
     assert view.go(path).find(CONTRAST) == []
+
+
+def played(page: Page, place: str) -> Locator:
+    """The figures that answer at a place."""
+    return page.locator(f"#{place} [data-play]")
+
+
+def offered(page: Page, place: str) -> pd.DataFrame:
+    """The data that a figure's caption offers: in it, or below the cell."""
+    captions = page.locator(f"#{place} figcaption, .cell:has(#{place}) + .caption")
+    link = captions.locator("a.download").first.get_attribute("href")
+    answer = page.request.get(urljoin(page.url, link))
+    return pd.read_csv(StringIO(answer.text()))
+
+
+def slide(host: Locator, value: int) -> None:
+    host.locator("input[type=range]").evaluate(
+        "(it, x) => { it.value = x; it.dispatchEvent(new Event('input')); }", value
+    )
+
+
+SEED_FIGURES = {
+    10: "03_reinforce",
+    11: "03_reinforce",
+    12: "04_dqn",
+    13: "04_dqn",
+    14: "05_continuous_reinforce",
+}
+
+
+@pytest.mark.parametrize("number", SEED_FIGURES)
+def test_every_seed_of_a_figure_shows_the_rows_it_offers(desk, number):
+    desk.go(f"book/{SEED_FIGURES[number]}.html")
+    panels, table = played(desk.page, f"figure-{number}"), offered(desk.page, f"figure-{number}")
+    arms = [rows for _, rows in table.groupby("arm", sort=False)]
+    assert panels.count() == len(arms)
+    for panel, rows in zip(panels.all(), arms, strict=True):
+        chips = panel.locator(".seed")
+        seeds = rows.groupby("seed")
+        assert chips.count() == len(seeds) > 1
+        for chip in chips.all():
+            chip.click()
+            shown = panel.locator("[aria-live]").inner_text()
+            seed = int(re.match(r"Seed (\d+): [a-z]", shown)[1])
+            link = panel.locator("a[download]").get_attribute("href")
+            drawn = pd.read_csv(StringIO(unquote(link.partition(",")[2]))).dropna()
+            assert (drawn["seed"] == seed).all()
+            steps = rows[rows["seed"] == seed].dropna().set_index("episode")["steps"]
+            there = steps.loc[drawn["episode"]].to_numpy()
+            np.testing.assert_allclose(drawn["steps"], there, rtol=6e-4)
+    assert desk.page.locator(f"#figure-{number} .play-films video").count() >= 3
+    assert desk.problems == []
+
+
+@pytest.mark.parametrize(
+    ("number", "first", "measures"),
+    [
+        *((f"s2-{n}", name, ("error", "unvisited", "earned", "lost")) for n, name in
+          ((5, "step_size"), (6, "exploitation"), (7, "temperature"))),
+    ],
+)  # fmt: skip
+def test_a_knob_of_chapter_2_shows_the_medians_of_its_data(desk, number, first, measures):
+    desk.go("book/02_q_learning.html")
+    (host,) = played(desk.page, f"figure-{number}").all()
+    table = offered(desk.page, f"figure-{number}")
+    medians = table.groupby(first)[list(measures)].median()
+    learned = table["lost"].le(10).groupby(table[first]).mean()
+    for place, value in enumerate(medians.index):
+        slide(host, place)
+        assert host.locator("output").inner_text().endswith(f"= {value:g}")
+        shown = [it.replace("−", "-") for it in host.locator("strong").all_inner_texts()]
+        expected = [*medians.loc[value], learned.loc[value]]
+        np.testing.assert_allclose([*map(float, shown)], expected, rtol=1e-3, atol=1e-9)
+
+
+def test_the_knob_of_chapter_5_shows_its_data(desk):
+    desk.go("book/05_continuous_reinforce.html")
+    (host,) = played(desk.page, "interactive-s5-1").all()
+    table = offered(desk.page, "interactive-s5-1").pivot(
+        index="arm", columns="measure", values="estimate"
+    )
+    for place, arm in enumerate(("as reported", "sigma 0.5", "sigma 1")):
+        slide(host, place)
+        shown = [it.replace("−", "-") for it in host.locator("strong").all_inner_texts()]
+        expected = table.loc[arm, ["learned", "steps", "return", "early"]]
+        for text, number in zip(shown, expected, strict=True):
+            if text == "–":
+                assert not np.isfinite(number)
+            else:
+                assert float(text) == pytest.approx(number, rel=1e-3)
+
+
+def test_the_mean_action_can_be_read_off(desk):
+    desk.go("book/05_continuous_reinforce.html")
+    (host,) = played(desk.page, "figure-s5-5").all()
+    table = offered(desk.page, "figure-s5-5").round({"position": 3, "velocity": 4})
+    agents = [name for name in table.columns if name.startswith("mean action")]
+    for place, agent in enumerate(agents):
+        slide(host, place)
+        host.locator(".play-chart").focus()
+        desk.page.keyboard.press("ArrowLeft")
+        desk.page.keyboard.press("ArrowUp")
+        words = host.locator("[aria-live]").inner_text().replace("−", "-")
+        value, x, y = map(float, re.findall(r"(?<= )-?[\d.]+(?=[ ,.])(?!\d)", words)[-3:])
+        near = (table["position"] - x).abs() + 10 * (table["velocity"] - y).abs()
+        assert value == pytest.approx(table.loc[near.idxmin(), agent], abs=1e-3)
+
+
+def test_figures_that_answer_are_light(visit):
+    """At most 250 kB a page: data and films; what they stand for was a picture before."""
+    data = visit.find(
+        "return [...article.querySelectorAll('[data-play] > script')].map(it => it.textContent)"
+    )
+    films = visit.find(
+        "return [...article.querySelectorAll('.play-films video')].map(it => it.src)"
+    )
+    bodies = [visit.page.request.get(film).body() for film in films]
+    assert sum(map(len, [*data, *bodies])) <= 250_000
 
 
 def cells(page: Page, name: str) -> list[str]:

@@ -75,12 +75,13 @@ def seed_tables() -> tuple[pd.DataFrame, pd.DataFrame]:
     stopped = fates["seed"] == 11
     fates.loc[stopped, ["fate", "steps_at_end"]] = ["out of budget", np.nan]
     table.loc[(table["seed"] == 11) & (table["episode"] > 350), "steps"] = np.nan
-    return table[["seed", "episode", "steps"]], fates
+    table["stopped"] = (table["seed"] == 2) & (table["episode"] == 1)
+    return table[["seed", "episode", "steps", "stopped"]], fates
 
 
-def knob_tables() -> tuple[dict[float, pd.DataFrame], pd.DataFrame]:
-    """The error over the episodes for some step sizes, and what it came to."""
-    curves, rows = {}, []
+def knob_tables() -> tuple[dict[float, pd.DataFrame], pd.DataFrame, np.ndarray]:
+    """The error over the episodes for some step sizes, what it came to, and for each seed."""
+    curves, rows, ends = {}, [], []
     for value in STEP_SIZES:
         config = QLearningConfig(step_size=value, exploration=EpsilonGreedy(0.9))
         table = q_learning(MODEL, config, episodes=600, seeds=range(4), Q_star=Q_STAR).table
@@ -89,8 +90,9 @@ def knob_tables() -> tuple[dict[float, pd.DataFrame], pd.DataFrame]:
         curves[value] = pd.DataFrame({**spread, "high": errors.max(axis=1)}).reset_index()
         lost = table.loc[table["episode"] == 600, "value_lost"]
         end = errors.iloc[-1].median()
+        ends.append(errors.iloc[-1])
         rows.append({"error at the end": end, "share that learned": (lost < 0.2).mean()})
-    return curves, pd.DataFrame(rows)
+    return curves, pd.DataFrame(rows), np.array(ends)
 
 
 X, Y = np.linspace(-1.2, 0.6, 25), np.linspace(-0.07, 0.07, 21)
@@ -106,7 +108,7 @@ class Demonstration:
         self.sweeps = maze_sweeps(MAZE, GAMMA)
         self.log = learning_log(MAZE, CONFIG, Q_STAR)
         self.curves, self.fates = seed_tables()
-        self.by_value, self.measures = knob_tables()
+        self.by_value, self.measures, self.ends = knob_tables()
         still = situation_figure(MAZE, Q_STAR, "")
         blank = Figure(figsize=(6, 3))
         film = Film(np.zeros((4, 64, 96, 3), np.uint8), frames_per_second=2, description="A film.")
@@ -116,16 +118,21 @@ class Demonstration:
             "One sweep at a time": maze_widget(MAZE, self.sweeps, still=still),
             "One step at a time": learning_widget(MAZE, self.log, Q_STAR, still=still),
             "Every seed": seed_curves(
-                *(self.curves, self.fates, original), still=blank, films=films, y_label="steps"
+                *(self.curves, self.fates, original),
+                still=blank,
+                films=films,
+                y_label="steps",
+                title="Greedy",
             ),
             "One knob": knob(
                 *("step size α", STEP_SIZES, self.by_value, self.measures),
                 **{"still": blank, "y_label": "RMSE, visitable entries"},
+                seeds={"error at the end": self.ends},
             ),
             "Over time": snapshots(
                 *(GRIDS,),
                 **{"x": X, "y": Y, "still": blank, "x_label": "position", "y_label": "velocity"},
-                value_label="mean action",
+                **{"value_label": "mean action", "mark": -np.pi / 6},
             ),
         }
 
@@ -421,6 +428,16 @@ def test_a_line_that_is_pointed_at_is_picked(page, demo):
     assert starts[seed] == starts[best]
 
 
+def test_the_median_its_band_and_what_was_stopped_are_drawn(page, demo):
+    host = figure(page, "seeds")
+    for name in ("path.median", "path.band"):
+        assert host.locator(name).get_attribute("d").count("L") > 100
+    assert host.locator(".cut").count() == 2  # an episode that was cut off, and a seed's end
+    assert host.locator(".title").inner_text() == "Greedy"
+    host.get_by_role("button", name="failed seeds only").click()
+    assert host.locator("path.median").count() == 0
+
+
 def test_a_film_opens_with_its_seed(page):
     host = figure(page, "seeds")
     host.get_by_role("button", name="seed 3,").click()
@@ -438,6 +455,7 @@ def test_a_knob_moves_its_measures(page, demo):
         assert host.locator("output").inner_text() == f"step size α = {value:g}"
         shown = [float(it) for it in host.locator(".play-measures strong").all_inner_texts()]
         assert shown == [float(f"{x:.4g}") for x in demo.measures.iloc[i]]
+    assert host.locator(".one-seed").count() == demo.ends.size
 
 
 def test_a_snapshot_can_be_read_off(page):
@@ -452,6 +470,10 @@ def test_a_snapshot_can_be_read_off(page):
     value = np.float32(GRIDS["episode 200"][i, j])
     assert text.startswith(f"episode 200: mean action {value:.3f} at position {X[j]:.3g}")
     assert f"velocity {Y[i]:.3g}" in text
+    positive = GRIDS["episode 200"] > 0
+    sides = sum(int((np.diff(positive, axis=axis) != 0).sum()) for axis in (0, 1))
+    assert host.locator(".border").get_attribute("d").count("M") == sides > 0
+    assert host.locator("line.mark").count() == 1
 
 
 def test_without_scripts_and_in_print_the_picture_stands_there(browser, address, page, demo):

@@ -218,10 +218,27 @@ def test_seeds_stand_best_first_with_the_rows_that_are_drawn():
     assert data["seeds"][2]["steps_at_end"] is None
     # A seed that has stopped counts as needing for ever.
     np.testing.assert_allclose(
-        np.array(data["median"], dtype=float),
+        np.array(data["middle"]["median"], dtype=float),
         steps.fillna(np.inf).median(axis=1).replace(np.inf, np.nan),
         rtol=5e-4,
     )
+
+
+def test_the_median_may_be_of_those_that_learned_and_what_was_cut_is_marked():
+    curves, fates = curves_and_fates()
+    curves["stopped"] = (curves["seed"] == 0) & (curves["episode"] == 1)
+    data = inline(seed_curves(curves, fates, still=STILL, points=50, median="learned"))
+    steps = curves.pivot(index="episode", columns="seed", values="steps").loc[data["episode"]]
+    middle = {name: np.array(each, dtype=float) for name, each in data["middle"].items()}
+    np.testing.assert_allclose(middle["median"], steps[[0, 2]].median(axis=1), rtol=5e-4)
+    assert (middle["low"] <= middle["median"]).all()
+    assert (middle["median"] <= middle["high"]).all()
+    assert data["middle_name"].startswith("median of those that learned")
+    assert [it["cut"] for it in data["seeds"]] == [[], [0], []]
+    none = seed_curves(curves, fates.assign(fate="lost"), still=STILL, median="learned")
+    assert inline(none)["middle"] == {"median": [], "low": [], "high": []}
+    with pytest.raises(ValueError, match=r"median must be one of \['all', 'learned'\], got 'some'"):
+        seed_curves(curves, fates, still=STILL, median="some")
 
 
 def test_thirty_seeds_fit_their_page():
@@ -264,6 +281,14 @@ def test_a_knob_has_a_curve_and_a_row_for_each_value():
     data = inline(knob("σ", [0.3, 1.0], {0.3: curve, 1.0: curve}, table, still=STILL))
     assert data["measures"][0] == {"name": "error at the end", "values": [0.1235, 2]}
     assert len(data["curves"][1]["high"]) == 150
+    each = {"error at the end": np.array([[0.1, 0.2, 0.3], [1, 2, 3]])}
+    of_seeds = knob("σ", [0.3, 1.0], {0.3: curve, 1.0: curve}, table, still=STILL, seeds=each)
+    measure, other = inline(of_seeds)["measures"]
+    assert measure["seeds"] == [[0.1, 0.2, 0.3], [1, 2, 3]]
+    assert (measure["low"], measure["high"]) == ([0.1, 1], [0.3, 3])
+    assert "seeds" not in other
+    with pytest.raises(ValueError, match=r"seeds\['error at the end'\] must be for a measure"):
+        knob(*("σ", [0.3], {0.3: curve}, table[:1]), still=STILL, seeds=each)
     with pytest.raises(ValueError, match="table must be a table of 1 rows, got 2"):
         knob("σ", [0.3], {0.3: curve}, table, still=STILL)
     with pytest.raises(ValueError, match="values must be in rising order, each once"):
@@ -279,6 +304,7 @@ def test_snapshots_are_kept_as_float32():
     assert np.array_equal(kept, grid.astype("<f4").ravel())
     assert data["limit"] == np.abs(2 * grid).max()
     assert [it["name"] for it in data["grids"]] == ["a", "b"]
+    assert data["mark"] is None
 
 
 @pytest.mark.parametrize(

@@ -143,3 +143,21 @@ def test_seeds_to_show_are_chosen_by_rule():
         "worst that learned": 0,
     }
     assert study.shown_seeds(ending(np.inf, np.inf), "")["failed"] == 0
+
+
+def test_every_seed_has_one_fate_and_its_budget():
+    arm, steps = "Acrobot, as reported", np.array([100.0, 900.0, np.nan, np.nan])
+    curves = SimpleNamespace(
+        seeds=range(4),
+        smooth={arm: steps[:, None]},
+        learned=lambda arm: steps <= study.LEARNED,
+        stopped_well=lambda arm: np.array([False, False, True, False]),
+        at=lambda arm, episode: np.where(np.isnan(steps), np.inf, steps),
+    )
+    rows = pd.DataFrame({"arm": arm, "seed": [0, 0, 1, 2, 3], "env_steps": [5, 9, 8, 7, 6]})
+    other = rows.assign(arm="another", env_steps=99)
+    found = study.fates(curves, pd.concat([rows, other]), arm)
+    out = ["out of budget while doing well", "out of budget"]
+    assert found["fate"].tolist() == ["learned", "not learned", *out]
+    assert found["env_steps"].tolist() == [9, 8, 7, 6]
+    assert found["steps_at_end"].isna().tolist() == [False, False, True, True]

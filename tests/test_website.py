@@ -1,9 +1,11 @@
 """What is rewritten in a built page."""
 
 import base64
+import re
 import struct
 
 import pytest
+import styles
 import website
 from docutils import nodes
 
@@ -58,3 +60,52 @@ def test_an_empty_heading_is_none(page):
 def test_a_description_ends_with_a_sentence_or_a_word(text, expected):
     page = nodes.section("", nodes.paragraph("", "no"), nodes.paragraph("", text))
     assert website.first_sentences(page) == expected
+
+
+def test_what_stands_inside_a_page_becomes_a_file_beside_it(page, tmp_path):
+    data = base64.b64encode(PNG).decode()
+    still = f'<div class="play-still"><img src="data:image/png;base64,{data}"></div>'
+    film = f'<video preload="auto" src="data:video/mp4;base64,{data}"></video>'
+    below = tmp_path / "book" / "page.html"
+    text = website.set_apart(still + still + film, below, tmp_path / "_images")
+    picture, again, movie = re.findall(r'src="\.\./_images/(\w+\.\w+)"', text)
+    assert picture == again != movie
+    assert (tmp_path / "_images" / movie).read_bytes() == PNG
+    assert text.count('<img loading="lazy" ') == 2
+    assert 'preload="metadata"' in text
+
+
+def test_formulas_are_left_for_later(page):
+    script = '<script defer="defer" src="../_static/mathjax/tex-chtml.js"></script>'
+    text = website.lightened(HEAD.replace("</head>", f"{script}</head>"), page)
+    assert script not in text
+    assert '<meta name="mathjax" content="../_static/mathjax/tex-chtml.js" />' in text
+
+
+def test_of_the_styles_only_what_can_be_used_stays():
+    known = styles.words(['<p class="a b-c" id="here">', "element.classList.add('open')"])
+    css = """
+        p:not(.nowhere) > .a, .nowhere { top: 0 }
+        #there { top: 1px }
+        @media print { .nowhere { top: 2px } .open { top: 3px } }
+        @supports (top: 0) { #there { top: 4px } }
+        @font-face { font-family: x }
+        .b-c:is(.nowhere, .a), .w-1\\/2 { content: ".nowhere { }" }
+        """
+    left = styles.pruned(css, known)
+    assert [number in left for number in ("0", "1px", "2px", "3px", "4px")] == [1, 0, 0, 1, 0]
+    assert left.startswith("p:not(.nowhere) > .a{")
+    assert "@font-face { font-family: x }" in left
+    assert '.b-c:is(.nowhere, .a),.w-1\\/2{ content: ".nowhere { }" }' in left
+
+
+def test_a_link_to_a_caption_leads_to_what_stands_above_it():
+    output = nodes.container(classes=["cell_output"])
+    cell = nodes.container("", output, classes=["cell"])
+    caption = nodes.container(classes=["caption"], ids=["figure-s1-1"])
+    other = nodes.container(classes=["caption"], ids=["figure-s1-2"])
+    page = nodes.section("", cell, caption, nodes.paragraph(), other)
+    website.land_on_pictures(None, page, "")
+    assert output["ids"] == ["figure-s1-1"]
+    assert caption["ids"] == []
+    assert other["ids"] == ["figure-s1-2"]

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import gymnasium as gym
 import numpy as np
 import pandas as pd
+from interactive import Widget, knob, seed_curves, snapshots
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -22,9 +23,16 @@ from drawings.look import (
     label,
     median_band,
 )
+from drawings.reinforce import films
+from report.figure_data import tidy
 from report.seeds import SEEDS
-from rl_core.evaluation import Weights, mean_actions, state_grid
+from rl_core.evaluation import Weights, as_learned, mean_actions, state_grid
+from rl_core.experiments import Results
 from rl_core.reinforce import ReinforceConfig
+from rl_core.statistics import bootstrap_interval
+from rl_core.training import weights_of
+from studies import continuous as study
+from studies import continuous_fates as fates
 from studies.continuous import (
     CONVERGED,
     EARLY,
@@ -37,21 +45,24 @@ from studies.continuous import (
     Curves,
 )
 from studies.continuous_fates import FATES
+from studies.shared import shown_agents
 
-EVERY = 10  # episodes between drawn points
+EVERY = 10  # episodes between drawn points, after the first
+POINTS = (1, *range(EVERY, EPISODES + 1, EVERY))
 
 
 def curve_data(curves: Curves, arms: Sequence[str]) -> pd.DataFrame:
-    """What the curves are drawn from: each seed's median of the last 100 episodes, every tenth.
+    """What the curves are drawn from: each seed's median of the last 100 episodes.
 
-    A seed that its budget cut while it still got out keeps its last value, as in the medians drawn.
+    Of the points the first and every tenth. A seed that its budget cut while it still got out keeps
+    its last value, as in the medians drawn.
     """
     tables = []
     for arm in arms:
         good = dict(zip(SEEDS, curves.learned(arm), strict=True))
         smooth = pd.DataFrame(curves.smooth[arm].T, columns=list(SEEDS))
         smooth.insert(0, "episode", np.arange(1, EPISODES + 1))
-        drawn = smooth[smooth["episode"] % EVERY == 0]
+        drawn = smooth[smooth["episode"].isin(POINTS)]
         long = drawn.melt("episode", var_name="seed", value_name="steps").dropna()
         tables.append(long.assign(arm=arm, learned=long["seed"].map(good)))
     return pd.concat(tables, ignore_index=True)
@@ -83,6 +94,60 @@ def learning_curves(curves: Curves, arms: Mapping[str, str], original: pd.DataFr
         axes.legend(fontsize=8, loc="upper right")
     plt.close(figure)
     return figure
+
+
+def every_seed(
+    curves: Curves, results: Results, arm: str, title: str, original: pd.DataFrame
+) -> Widget:
+    """An arm's panel as a figure that answers; with films of single seeds, if as reported."""
+    smooth = curves.smooth[arm].copy()
+    smooth[np.arange(1, EPISODES + 1) > curves.ends[arm][:, None]] = np.nan
+    x = np.array(POINTS)
+    arrays, config = results.arrays(arm), study.config(arm)
+    agents = shown_agents(
+        fates.shown_seeds(curves, arm),
+        lambda place, moment: as_learned(config, weights_of(arrays, place, moment)),
+    )
+    return seed_curves(
+        tidy(x, {arm: smooth[:, x - 1]}, value="steps"),
+        *(fates.of_each_seed(curves, results, arm), original),
+        still=learning_curves(curves, {arm: title}, original),
+        films=films(ENV, agents) if arm == "as reported" else {},
+        label=f"Learning curves of the seeds over the published curve, {title}.",
+        title=title,
+        median="learned",
+    )
+
+
+def sigma_knob(curves: Curves, table: pd.DataFrame) -> Widget:
+    """The arms of sigma, one at a time: their curves, and what came of them.
+
+    Parameters
+    ----------
+    curves : Curves
+    table : pandas.DataFrame
+        Of `studies.continuous.tradeoff`.
+    """
+    x, by_value = np.arange(EVERY, EPISODES + 1, EVERY), {}
+    arms = dict(zip(SIGMAS, SWEEPS["two observations"], strict=True))
+    rng = np.random.default_rng(np.random.SeedSequence(2020))
+    for sigma, arm in arms.items():
+        steps = curves.smooth[arm][curves.learned(arm)][:, x - 1]
+        empty = np.full(len(x), np.nan)
+        found = bootstrap_interval(steps, rng=rng, resamples=2_000) if len(steps) else [empty] * 3
+        columns = dict(zip(("median", "low", "high"), found, strict=True))
+        by_value[sigma] = pd.DataFrame({"episode": x, **columns})
+    wide = table.pivot(index="arm", columns="measure", values="estimate").loc[list(arms.values())]
+    names = {it: PANELS[it][0].replace("\n", " ") for it in ("learned", "steps", "return", "early")}
+    return knob(
+        "σ",
+        list(arms),
+        by_value,
+        wide[list(names)].rename(columns=names),
+        still=variants(curves, {arm: f"σ = {sigma}" for sigma, arm in arms.items()}),
+        label="Learning curves for three widths of the noise, and what they trade.",
+        y_label="steps to the goal",
+    )
 
 
 def _every_seed(axes: Axes, curves: Curves, arm: str) -> None:
@@ -232,7 +297,7 @@ def mean_action_maps(
     figure, panels = plt.subplots(
         *(n_rows, 2), figsize=(6.4, 2.6 * n_rows), sharex=True, sharey=True, squeeze=False
     )
-    tables = []
+    table = pd.DataFrame(grid, columns=["position", "velocity"])
     for axes, (agent, weights) in zip(panels.flat, agents.items(), strict=False):
         means = mean_actions(config, weights, grid)[:, 0]
         plane = means.reshape(points, points).T
@@ -244,8 +309,7 @@ def mean_action_maps(
         axes.axvline(-np.pi / 6, color=BLACK, lw=0.7, ls=":")
         axes.grid(visible=False)
         axes.set_title(agent, fontsize=9)
-        table = pd.DataFrame(grid, columns=["position", "velocity"])
-        tables.append(table.assign(agent=agent, mean_action=means))
+        table[f"mean action, {agent}"] = means.round(4)
     for axes in panels[-1]:
         axes.set_xlabel("position")
     for axes in panels[:, 0]:
@@ -254,7 +318,26 @@ def mean_action_maps(
         picture, ax=panels, label="mean action (force)", extend="both", shrink=0.5, aspect=30
     )
     plt.close(figure)
-    return figure, pd.concat(tables, ignore_index=True)
+    return figure, table
+
+
+def mean_action_snapshots(
+    config: ReinforceConfig, agents: Mapping[str, Weights], still: Figure, points: int = 41
+) -> Widget:
+    """The same, one agent at a time, coarser."""
+    space = gym.make(ENV).observation_space
+    grid = state_grid(space, points)
+    planes = {
+        agent: mean_actions(config, weights, grid)[:, 0].reshape(points, points).T
+        for agent, weights in agents.items()
+    }
+    x, y = (np.linspace(low, high, points) for low, high in zip(space.low, space.high, strict=True))
+    return snapshots(
+        planes,
+        **{"x": x, "y": y, "still": still, "limit": 1.0, "mark": -np.pi / 6},
+        **{"x_label": "position", "y_label": "velocity (a step)", "value_label": "mean action"},
+        label="The mean action over position and velocity, as it was learned.",
+    )
 
 
 def profiles(table: pd.DataFrame) -> Figure:

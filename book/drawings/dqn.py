@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
+from interactive import Widget, seed_curves
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
@@ -11,9 +12,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from drawings.look import BLACK, BLUE, COLOURS, GREY, LINES, ORANGE, SKY_BLUE, VERMILLION, label
-from rl_core.evaluation import Rollout, Weights, action_values
+from drawings.reinforce import films
+from rl_core.evaluation import Rollout, Weights, action_values, of_values
+from rl_core.experiments import Results
 from rl_core.statistics import bootstrap_interval
+from rl_core.training import weights_of
+from studies import dqn as study
 from studies.dqn import BUDGET, ENV, EPISODES, LEARNED, PARTS, Curves
+from studies.shared import shown_agents
 
 PUSHES = ("left", "none", "right")
 _PUSH_COLOURS = ListedColormap([SKY_BLUE, "#eeeeee", ORANGE])
@@ -47,6 +53,26 @@ def learning_curve(curves: Curves, name: str, original: pd.DataFrame) -> Figure:
     figure.legend(loc="outside lower center", ncols=2, fontsize=9)
     plt.close(figure)
     return figure
+
+
+def every_seed(curves: Curves, results: Results, name: str, original: pd.DataFrame) -> Widget:
+    """The learning curve as a figure that answers, with films of single seeds below it.
+
+    The films' agents act as at the end of their training, one action in ten at random, and before
+    learning as at its beginning, nine in ten.
+    """
+    arm, rows = f"{name}, as reported", curves.table[f"{name}, as reported"]
+    arrays = results.arrays(arm)
+    agents = shown_agents(
+        study.shown_seeds(curves, arm),
+        lambda place, moment: of_values(weights_of(arrays, place, moment), 0.9 if moment else 0.1),
+    )
+    return seed_curves(
+        *(rows.assign(stopped=~rows["terminated"]), study.fates(curves, arm), original),
+        still=learning_curve(curves, name, original),
+        films=films(ENV[name], agents),
+        label=f"Learning curves of all seeds on {name} with DQN over the published curve.",
+    )
 
 
 def shares(curves: Curves, variants: Sequence[str]) -> Figure:

@@ -1,5 +1,7 @@
 """Chapter 1: the drawings that belong to it alone."""
 
+from collections.abc import Mapping
+
 import pandas as pd
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
@@ -19,6 +21,22 @@ def convergence(sweeps: pd.DataFrame, *, gamma: float, threshold: float) -> Figu
     axes.semilogy(x, sweeps["residual"], color=VERMILLION, ls="-", label="residual: largest change")
     axes.axhline(threshold, color=GREEN, ls=":", label=f"the report's threshold {threshold:g}")
     label(axes, x="sweep k", y="change of Q (reward units)")
+    axes.legend()
+    plt.close(figure)
+    return figure
+
+
+def over_reported(tables: Mapping[str, pd.DataFrame], threshold: float) -> Figure:
+    """The residual of each sweep, of the reported settings first, then of others."""
+    figure, axes = plt.subplots(figsize=(6.4, 3.4))
+    looks = zip(
+        tables.items(), (GREY, VERMILLION, BLUE, GREEN), ("-", "--", "-.", ":"), strict=False
+    )
+    for (text, sweeps), colour, line in looks:
+        name = f"{text}: {len(sweeps)} sweeps"
+        axes.semilogy(sweeps["sweep"], sweeps["residual"], color=colour, ls=line, label=name)
+    axes.axhline(threshold, color=GREEN, ls=":", label=f"the report's threshold {threshold:g}")
+    label(axes, x="sweep", y="largest change of Q (reward units)")
     axes.legend()
     plt.close(figure)
     return figure

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
+from interactive import Widget, knob
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -21,6 +22,7 @@ from rl_core.statistics import bootstrap_interval
 from studies.q_learning import EPISODES
 from studies.q_learning_world import World
 
+STUCK = 10  # % of the optimum: a greedy policy that loses more is stuck
 WIDTH = 5.6  # inches: small, so that the letters stay large on a phone
 
 
@@ -69,6 +71,22 @@ def figure_9(world: World, norms: np.ndarray, original: pd.DataFrame, level: flo
     label(bottom, x="episode", y="‖Q − Q*‖", title="the same, its lower end enlarged")
     handles, names = bottom.get_legend_handles_labels()
     top.legend(handles, names, loc="upper right")
+    plt.close(figure)
+    return figure
+
+
+def over_reported(norms: np.ndarray, table: pd.DataFrame, text: str) -> Figure:
+    """The error of a few seeds with changed settings over that of all seeds as reported."""
+    figure, axes = plt.subplots(figsize=(WIDTH, 3.4))
+    every = np.arange(0, EPISODES, 10)
+    band(axes, every + 1, norms[:, every], colour=GREY, name="as reported")
+    wide = table.pivot(index="episode", columns="seed", values="error_norm")
+    drawn = wide[wide.index % 10 == 1]
+    lines = axes.plot(drawn.index, drawn, color=VERMILLION, ls="-", lw=0.8)
+    lines[0].set_label(text)
+    axes.set(xlim=(0, EPISODES), ylim=(0, None))
+    label(axes, x="episode", y="‖Q − Q*‖ (reward units)")
+    axes.legend(loc="upper right")
     plt.close(figure)
     return figure
 
@@ -194,6 +212,40 @@ def sweep(swept: pd.DataFrame, *, x: str, ticks: Sequence[float], log: bool) -> 
         label(axes, x=x, y=unit, title=title)
     plt.close(figure)
     return figure
+
+
+def turning(
+    swept: pd.DataFrame, errors: Mapping[float, np.ndarray], *, x: str, ticks, log: bool
+) -> Widget:
+    """`sweep` as a figure that answers, with the error over the episodes for each value.
+
+    Parameters
+    ----------
+    swept : pandas.DataFrame
+        As for `sweep`; so are `x`, `ticks` and `log`.
+    errors : mapping of float to ndarray, shape (seeds, EPISODES)
+        For each value of the parameter.
+    """
+    wide = {
+        f"{title} ({unit})": swept.pivot(index=swept.columns[0], columns="seed", values=measure)
+        for measure, (title, unit) in MEASURES.items()
+    }
+    lost = swept.pivot(index=swept.columns[0], columns="seed", values="lost")
+    table = pd.DataFrame({name: seeds.median(axis=1) for name, seeds in wide.items()})
+    table[f"share of seeds that lose at most {STUCK}%"] = (lost <= STUCK).mean(axis=1)
+    at = np.unique(np.geomspace(1, EPISODES, 90).round().astype(int))
+    rng, curves = np.random.default_rng(2018), {}
+    for value, seeds in errors.items():
+        found = bootstrap_interval(seeds[:, at - 1], rng=rng, resamples=2_000)
+        columns = dict(zip(("median", "low", "high"), found, strict=True))
+        curves[value] = pd.DataFrame({"episode": at, **columns})
+    return knob(
+        *(x.partition(" (")[0], list(table.index), curves, table),
+        still=sweep(swept, x=x, ticks=ticks, log=log),
+        seeds={name: seeds.to_numpy() for name, seeds in wide.items()},
+        label=f"What the {x} does to the error, to coverage, to what is earned and to what is lost",
+        y_label="error of Q (RMSE, visitable entries)",
+    )
 
 
 def _ticks(axis: Axis, values: Sequence[float]) -> None:

@@ -1,20 +1,26 @@
-"""Chapter 3: learning curves over those of 2018, and films of the agent before and after."""
+"""Chapter 3: learning curves over those of 2018, and films of single seeds."""
 
 from collections.abc import Mapping, Sequence
 
 import gymnasium as gym
 import numpy as np
 import pandas as pd
-from matplotlib import font_manager
+from interactive import Widget, seed_curves
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image
 
 from drawings.look import BLACK, BLUE, COLOURS, GREY, LINES, Film, label
-from rl_core.evaluation import Rollout
+from rl_core.evaluation import Agent, Rollout, as_learned, rollout
+from rl_core.experiments import Results
 from rl_core.statistics import bootstrap_interval
+from rl_core.training import weights_of
+from studies import reinforce as study
 from studies.reinforce import DRAWN, EPISODES, Curves
+from studies.shared import shown_agents
 
+LONGEST = 300  # steps of a film
+EVERY = 4  # steps from one of its pictures to the next
 LIMIT = {"Acrobot": 500, "MountainCar": 200}  # Gymnasium's own time limits, for orientation
 
 
@@ -45,6 +51,23 @@ def learning_curve(curves: Curves, arm: str, original: pd.DataFrame) -> Figure:
     axes.legend(fontsize=9)
     plt.close(figure)
     return figure
+
+
+def every_seed(curves: Curves, results: Results, name: str, original: pd.DataFrame) -> Widget:
+    """The learning curve as a figure that answers, with films of single seeds below it."""
+    arm = f"{name}, as reported"
+    config, arrays = study.arm(name, "as reported").config, results.arrays(arm)
+    agents = shown_agents(
+        study.shown_seeds(curves, arm),
+        lambda place, moment: as_learned(config, weights_of(arrays, place, moment)),
+    )
+    return seed_curves(
+        *(curves.rows([arm]), study.fates(curves, results.table, arm), original),
+        still=learning_curve(curves, arm, original),
+        films=films(study.ENVIRONMENTS[name][0], agents),
+        label=f"Learning curves of all seeds on {name} over the published curve.",
+        points=len(DRAWN),
+    )
 
 
 def variants(curves: Curves, name: str, names: Mapping[str, str]) -> Figure:
@@ -124,25 +147,27 @@ def over_reported(
     return figure
 
 
-def before_and_after(env_id: str, before: Rollout, after: Rollout, description: str) -> Film:
-    """Two episodes side by side: with the initial weights and with the trained ones."""
-    return side_by_side(env_id, {"before": before, "after": after}, description)
+def films(
+    env_id: str, agents: Mapping[str, tuple[int | None, Agent]]
+) -> dict[str, tuple[int | None, Film]]:
+    """An episode of each agent, as `interactive.seed_curves` takes them.
 
-
-def side_by_side(
-    env_id: str, episodes: Mapping[str, Rollout], description: str, smaller: int = 2
-) -> Film:
-    """Episodes side by side, each with its title and step; one that is over stands still."""
-    played = {title: _frames(env_id, one, smaller) for title, one in episodes.items()}
-    length = max(map(len, played.values()))
-    pictures = []
-    for t in range(0, length + 30, 3):
-        parts = []
-        for title, frames in played.items():
-            step = min(t, len(frames) - 1)
-            parts.append(_titled(frames[step], f"{title}: step {step}"))
-        pictures.append(np.concatenate(parts, axis=1))
-    return Film(pictures, frames_per_second=15, description=description)
+    Parameters
+    ----------
+    env_id : str
+    agents : mapping of str to (int or None, Agent)
+        By what is said of each; with the seed that has learned it, if it is to be found by that.
+    """
+    shelf = {}
+    for text, (seed, agent) in agents.items():
+        episode = rollout(env_id, agent, np.random.default_rng(0), LONGEST)
+        steps = len(episode.rewards)
+        end = f"at the goal after {steps} steps" if episode.terminated else f"{steps} steps"
+        name = text if seed is None else f"{text}, seed {seed}"
+        frames = _frames(env_id, episode, smaller=3)[::EVERY]
+        said = f"{env_id}, {name}: {end}."
+        shelf[f"{name}: {end}"] = seed, Film(frames, frames_per_second=12, description=said)
+    return shelf
 
 
 def _frames(env_id: str, episode: Rollout, smaller: int) -> list[np.ndarray]:
@@ -156,11 +181,3 @@ def _frames(env_id: str, episode: Rollout, smaller: int) -> list[np.ndarray]:
         pictures.append(env.render())
     env.close()
     return [np.asarray(Image.fromarray(picture).reduce(smaller)) for picture in pictures]
-
-
-def _titled(frame: np.ndarray, title: str) -> np.ndarray:
-    font = ImageFont.truetype(font_manager.findfont("DejaVu Sans"), 14)
-    picture = Image.new("RGB", (frame.shape[1], frame.shape[0] + 24), "white")
-    picture.paste(Image.fromarray(np.ascontiguousarray(frame)), (0, 24))
-    ImageDraw.Draw(picture).text((6, 3), title, font=font, fill="black")
-    return np.asarray(picture)

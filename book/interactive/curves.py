@@ -5,12 +5,15 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike, NDArray
 
 from interactive.page import Widget, as_html, significant
 from rl_core.checks import instance, integer, require
+from rl_core.statistics import bootstrap_interval
 
 CURVE = ("seed", "episode", "steps")
 FATE = ("seed", "fate", "steps_at_end", "env_steps")
+MIDDLES = {"all": "median of all, 95% interval", "learned": "median of those that learned, 95%"}
 
 
 def seed_curves(
@@ -21,9 +24,11 @@ def seed_curves(
     still: Any,
     films: Mapping[str, Any] | None = None,
     label: str = "Learning curves of every seed.",
+    title: str = "",
     y_label: str = "steps to the goal",
     log: bool = True,
     learned: str = "learned",
+    median: str = "all",
     points: int = 150,
 ) -> Widget:
     """Let the reader look at every seed: its curve, its fate, its rows, its film.
@@ -33,6 +38,7 @@ def seed_curves(
     curves : pandas.DataFrame
         Columns `seed`, `episode`, `steps`, as they shall be drawn (smoothed or not). NaN where a
         seed had stopped; of its episodes at most `points` are kept, evenly spaced, and four digits.
+        A column `stopped` marks episodes that were cut off.
     fates : pandas.DataFrame
         A row a seed: `seed`, `fate` in words ("learned", "not learned", "out of budget", ...),
         `steps_at_end`, and `env_steps`, the budget used.
@@ -43,12 +49,15 @@ def seed_curves(
     films : mapping, optional
         Under names such as "best seed" films, as HTML or as objects with `_repr_html_`; or pairs of
         a seed and its film, which then can be picked together with the seed.
-    label, y_label : str
-        What the figure shows, and the name of its vertical axis.
+    label, title, y_label : str
+        What the figure shows, what stands above it, and the name of its vertical axis.
     log : bool
         A logarithmic vertical axis.
     learned : str
         The one fate that is no failure.
+    median : str
+        Over which seeds the median is drawn, with its 95% bootstrap interval: "all", where one that
+        had stopped counts as needing for ever, or "learned".
     points : int
         The most points a curve has.
 
@@ -77,20 +86,24 @@ def seed_curves(
     wide = curves.pivot(index="episode", columns="seed", values="steps").sort_index()
     require(set(wide.columns) == set(seeds), "curves", list(wide.columns), f"of the seeds {seeds}")
     integer("points", points, least=2)
+    require(median in MIDDLES, "median", median, f"one of {list(MIDDLES)}")
     kept = np.unique(np.linspace(0, len(wide) - 1, min(points, len(wide))).round().astype(int))
     wide = wide.iloc[kept]
+    cut = _marked(curves, wide)
     lost = fates["fate"] != learned
     order = fates.assign(lost=lost).sort_values(
         ["lost", "steps_at_end", "seed"], na_position="last"
     )
     shelf = _shelf(films or {}, seeds)
     data = {
+        "title": title,
         "y_label": y_label + (" (logarithmic)" if log else ""),
         "log": bool(log),
         "episode": wide.index.to_numpy(),
         "rows_in_all": int(curves["episode"].nunique()),
         "original": None if original is None else _band(original),
-        "median": significant(np.median(wide.fillna(np.inf), axis=1)),
+        "middle": _middle(wide if median == "all" else wide[fates.loc[~lost, "seed"]]),
+        "middle_name": MIDDLES[median],
         "seeds": [
             {
                 "seed": row.seed,
@@ -99,6 +112,7 @@ def seed_curves(
                 "steps_at_end": significant([row.steps_at_end])[0],
                 "env_steps": row.env_steps,
                 "steps": significant(wide[row.seed]),
+                "cut": np.flatnonzero(cut[row.seed]),
             }
             for row in order.itertuples()
         ],
@@ -111,6 +125,29 @@ def seed_curves(
     return Widget(
         "seeds", data, label, still, f'<div class="play-films">{below}</div>' * bool(below)
     )
+
+
+def _marked(curves: pd.DataFrame, wide: pd.DataFrame) -> pd.DataFrame:
+    """Return which of the points drawn are episodes that were cut off."""
+    if "stopped" not in curves:
+        return wide.isna() & False
+    marks = curves.pivot(index="episode", columns="seed", values="stopped")
+    return marks.reindex_like(wide).fillna(value=False).astype(bool)
+
+
+def _middle(wide: pd.DataFrame) -> dict[str, Any]:
+    """Return the median over seeds and its interval, which ends at the largest value."""
+    if wide.empty or not wide.columns.size:
+        return {"median": [], "low": [], "high": []}
+    rng = np.random.default_rng(np.random.SeedSequence(2020))
+    found = bootstrap_interval(wide.T.fillna(np.inf).to_numpy(), rng=rng, resamples=2_000)
+    top = np.where(np.isfinite(found.low), np.nanmax(wide), np.nan)
+    high = np.where(np.isinf(found.high), top, found.high)
+    return {
+        "median": significant(found.estimate),
+        "low": significant(found.low),
+        "high": significant(high),
+    }
 
 
 def _shelf(films: Mapping[str, Any], seeds: Sequence[Any]) -> list[tuple[str, Any, Any]]:
@@ -130,6 +167,7 @@ def knob(
     table: pd.DataFrame,
     *,
     still: Any,
+    seeds: Mapping[str, ArrayLike] | None = None,
     label: str = "",
     y_label: str = "error",
     log: bool = True,
@@ -150,6 +188,9 @@ def knob(
         end" or "share that learned", and is drawn against the knob.
     still : matplotlib.figure.Figure or str or object with _repr_html_
         The picture where there are no scripts.
+    seeds : mapping of str to array of shape (values, seeds), optional
+        For some of the measures what each seed has: its dots, and the 95% bootstrap interval of
+        their median as a band.
     label, y_label : str
         What the figure shows, and the name of the curves' vertical axis.
     log : bool
@@ -187,6 +228,10 @@ def knob(
         f"a mapping from {values}",
     )
     integer("points", points, least=2)
+    dots = {it: np.asarray(each, dtype=float) for it, each in (seeds or {}).items()}
+    for it, each in dots.items():
+        fits = it in table and each.ndim == 2 and len(each) == len(values)
+        require(fits, f"seeds[{it!r}]", each.shape, f"for a measure, of shape ({len(values)}, n)")
     curves = []
     for value in values:
         curve = curves_by_value[value]
@@ -205,9 +250,21 @@ def knob(
         "y_label": y_label + (" (logarithmic)" if log else ""),
         "log": bool(log),
         "curves": curves,
-        "measures": [{"name": str(it), "values": significant(table[it])} for it in table.columns],
+        "measures": [
+            {"name": str(it), "values": significant(table[it]), **_spread(dots.get(it))}
+            for it in table.columns
+        ],
     }
     return Widget("knob", data, label or f"What {name} does.", still)
+
+
+def _spread(seeds: NDArray[np.float64] | None) -> dict[str, Any]:
+    """Return each seed's value, and the ends of the interval of their median."""
+    if seeds is None:
+        return {}
+    _, low, high = bootstrap_interval(seeds.T, rng=np.random.default_rng(2018))
+    ends = {"low": significant(low), "high": significant(high)}
+    return {"seeds": [significant(each, 3) for each in seeds], **ends}
 
 
 def _columns(name: str, table: object, columns: Sequence[str]) -> None:

@@ -21,9 +21,12 @@ def snapshots(
     y_label: str = "y",
     value_label: str = "value",
     limit: float | None = None,
+    mark: float | None = None,
     label: str = "",
 ) -> Widget:
     """Let the reader go through the snapshots of a field, and read off its values.
+
+    A black line is drawn where the sign changes.
 
     Parameters
     ----------
@@ -39,6 +42,8 @@ def snapshots(
     limit : float, optional
         Colours go from -limit (orange) over 0 (white) to limit (purple), as in the still figures;
         what is beyond has the last colour. By default the largest absolute value.
+    mark : float, optional
+        Where on x a dotted line stands.
     label : str
         What the figure shows.
 
@@ -75,6 +80,7 @@ def snapshots(
         "y_label": y_label,
         "value_label": value_label,
         "limit": top,
+        "mark": mark if mark is None else float(mark),
         "grids": [
             {"name": name, "values": base64.b64encode(field.astype("<f4").tobytes()).decode()}
             for name, field in fields.items()

@@ -273,10 +273,9 @@ def _picture(figure: Figure) -> str:
 
 
 def _card(number: str, page: str, figure: Figure, title: str, text: str) -> str:
-    return (
-        f'<a class="thumbnail" href="{html.escape(page)}"><img src="{_picture(figure)}" '
-        f'alt="{html.escape(text)}"><span>{html.escape(number)}. {html.escape(title)}</span></a>'
-    )
+    picture = f'<img loading="lazy" src="{_picture(figure)}" alt="{html.escape(text)}">'
+    words = f"<span>{html.escape(number)}. {html.escape(title)}</span>"
+    return f'<a class="thumbnail" href="{html.escape(page)}">{picture}{words}</a>'
 
 
 def thumbnails(results: Path, originals: Path, situation: Figure) -> str:

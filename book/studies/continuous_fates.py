@@ -12,6 +12,7 @@ from rl_core.experiments import Results
 from rl_core.policies import MLP, Gaussian
 from rl_core.reinforce import ReinforceConfig
 from rl_core.training import weights_of
+from studies import shared
 from studies.continuous import ENV, EXTREME, VARIANTS, Curves
 
 FATES = (
@@ -87,6 +88,17 @@ def fate_table(curves: Curves, results: Results) -> pd.DataFrame:
         names = fates(curves, arm, results.arrays(arm)["log_sigma"])
         rows.append({"arm": arm, **{fate: names.count(fate) for fate in FATES}})
     return pd.DataFrame(rows)
+
+
+def shown_seeds(curves: Curves, arm: str) -> dict[str, int]:
+    """Places of the seeds to show of an arm."""
+    return shared.shown_seeds(curves.at(arm), curves.learned(arm))
+
+
+def of_each_seed(curves: Curves, results: Results, arm: str) -> pd.DataFrame:
+    """What became of each seed of an arm."""
+    names = fates(curves, arm, results.arrays(arm)["log_sigma"])
+    return shared.fate_table(curves.rows[arm], SEEDS, names, curves.at(arm))
 
 
 def learned_sigma(curves: Curves, results: Results) -> str:

@@ -32,6 +32,7 @@ from rl_core.statistics import (
 )
 from rl_core.training import weights_of
 from rl_core.worlds.shaping import Shaping
+from studies import shared
 
 EPISODES = 100  # of figures 12 and 13
 BUDGET = {"Acrobot": 25_000, "MountainCar": 45_000}  # environment steps a seed, for the causes
@@ -543,6 +544,19 @@ def median_seed(curves: Curves, arm: str) -> int:
     steps = curves.at(arm, EPISODES) if reported_arm else curves.steps_a_goal(arm)
     order = np.argsort(steps, kind="stable")
     return int(order[(len(order) - 1) // 2])
+
+
+def shown_seeds(curves: Curves, arm: str) -> dict[str, int]:
+    """Places of the seeds to show of a reported arm."""
+    return shared.shown_seeds(curves.at(arm, EPISODES), curves.learned(arm))
+
+
+def fates(curves: Curves, arm: str) -> pd.DataFrame:
+    """What became of each seed of a reported arm."""
+    stopped = np.isnan(curves.raw[arm][:, -1])
+    fate = np.select([curves.learned(arm), stopped], ["learned", "out of budget"], "not learned")
+    ends = curves.at(arm, EPISODES)
+    return shared.fate_table(curves.table[arm], SEEDS, fate.tolist(), ends)
 
 
 def premises(curves: Curves) -> dict[str, bool]:

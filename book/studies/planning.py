@@ -29,6 +29,10 @@ from rl_core.statistics import bootstrap_interval
 
 GAMMA = 0.9
 THRESHOLD = 1e-5
+EXACT = 1e-10
+"""How far from the fixed point what is called exact may be."""
+RANDOM = {"rows": 8, "columns": 8, "flags": 3, "wall_fraction": 0.25}
+"""What a random maze is like; its floor slips as the Maze's."""
 # Stopping at a difference of THRESHOLD leaves an error of at most gamma / (1 - gamma) times that.
 ERROR_BOUND = GAMMA / (1 - GAMMA) * THRESHOLD
 
@@ -124,10 +128,23 @@ CLAIMS = (
 
 def mazes(seeds: range = SEEDS) -> dict[int, Maze]:
     """Random mazes of 8 x 8 cells with three flags, one a seed."""
-    return {
-        seed: random_maze(8, 8, flags=3, wall_fraction=0.25, rng=np.random.default_rng(seed))
-        for seed in seeds
+    return {seed: random_maze(**RANDOM, rng=np.random.default_rng(seed)) for seed in seeds}
+
+
+def settings(maze: Maze, seeds: range = SEEDS) -> pd.DataFrame:
+    """All that decides the numbers of the chapter, a row a setting."""
+    rows = {
+        "layout of the Maze": " / ".join(maze.layout.split()),
+        "slip: probability of a quarter turn clockwise": maze.slip,
+        "discount, gamma": GAMMA,
+        "Q-value iteration stops at a change (Frobenius norm) below": THRESHOLD,
+        "values called exact are within": EXACT,
+        "random mazes: cells": f"{RANDOM['rows']} × {RANDOM['columns']}",
+        "random mazes: flags": RANDOM["flags"],
+        "random mazes: share of walls": RANDOM["wall_fraction"],
+        "random mazes: seeds": f"{seeds[0]} to {seeds[-1]}",
     }
+    return pd.DataFrame(rows.items(), columns=["setting", "value"], dtype=str)
 
 
 def sweeps(mdp: MDP, gamma: float) -> Iterator[np.ndarray]:
@@ -160,7 +177,7 @@ def approach(mdp: MDP, Q_star: np.ndarray) -> pd.DataFrame:
 def approach_of(maze: Maze) -> pd.DataFrame:
     """The approach of Q-value iteration to a maze's optimal values."""
     mdp = maze.model()
-    return approach(mdp, value_iteration(mdp, gamma=GAMMA, tolerance=1e-10).Q)
+    return approach(mdp, value_iteration(mdp, gamma=GAMMA, tolerance=EXACT).Q)
 
 
 def renamed(mdp: MDP) -> MDP:
@@ -182,7 +199,7 @@ def misled(mdp: MDP) -> float:
     A model and its twin with renamed actions have the same V*. Where their optimal actions have
     none in common, no rule that looks at V* alone is right in both.
     """
-    one, other = (value_iteration(m, gamma=GAMMA, tolerance=1e-10) for m in (mdp, renamed(mdp)))
+    one, other = (value_iteration(m, gamma=GAMMA, tolerance=EXACT) for m in (mdp, renamed(mdp)))
     assert np.abs(one.V - other.V).max() < 1e-9
     common = optimal_actions(one.Q) & optimal_actions(other.Q)
     return float(1 - common.any(axis=1)[~mdp.terminal].mean())
@@ -229,7 +246,7 @@ def decisions(q_values: pd.DataFrame) -> pd.DataFrame:
 def measure(maze: Maze) -> dict[str, float]:
     """Everything the claims ask of one maze."""
     mdp = maze.model()
-    exact = value_iteration(mdp, gamma=GAMMA, tolerance=1e-10)
+    exact = value_iteration(mdp, gamma=GAMMA, tolerance=EXACT)
     by_value = q_value_iteration(mdp, gamma=GAMMA, threshold=THRESHOLD)
     by_policy = policy_iteration(mdp, gamma=GAMMA)
     best = optimal_actions(exact.Q)[~mdp.terminal]

@@ -305,6 +305,11 @@ def curves(results: Results, arm: Arm, column: str) -> np.ndarray:
     return table[column].to_numpy(dtype=float).reshape(-1, EPISODES)
 
 
+def errors(results: Results, arms: Mapping[float, Arm]) -> dict[float, np.ndarray]:
+    """The error in the visitable entries over the episodes, for each value of a parameter."""
+    return {value: curves(results, arm, "rmse_visitable") for value, arm in arms.items()}
+
+
 def earned_curves(results: Results, arm: Arm, window: int) -> np.ndarray:
     """The mean discounted return of every `window` episodes, shape (seeds, windows)."""
     each = GAMMA ** (curves(results, arm, "steps") - 1) * curves(results, arm, "return")

@@ -37,6 +37,7 @@ from rl_core.statistics import (
     probability_of_improvement,
     proportion_interval,
 )
+from studies import shared
 
 EPISODES = 2_000
 BUDGET = 4_000_000  # environment steps a seed
@@ -409,17 +410,17 @@ def wall_clock(results: Results, reported_minutes: dict[str, float]) -> pd.DataF
 
 
 def shown_seeds(curves: Curves, arm: str) -> dict[str, int]:
-    """Places of the seeds to show, by a rule: best, middle and worst at the end, first to fail.
+    """Places of the seeds to show."""
+    return shared.shown_seeds(curves.at(arm, EPISODES), curves.learned(arm))
 
-    The middle is that of all seeds, the worst that of those that learned.
-    """
-    order = np.argsort(curves.at(arm, EPISODES), kind="stable")
-    good = curves.learned(arm)
-    learners = [place for place in order if good[place]]
-    places = {"best": order[0], "middle": order[(len(order) - 1) // 2]}
-    places |= {"worst that learned": learners[-1]} if learners else {}
-    places |= {"failed": np.flatnonzero(~good)[0]} if not good.all() else {}
-    return {text: int(place) for text, place in places.items()}
+
+def fates(curves: Curves, rows: pd.DataFrame, arm: str) -> pd.DataFrame:
+    """What became of each seed of an arm, whose episodes are among the rows."""
+    stopped, well = np.isnan(curves.smooth[arm][:, -1]), curves.stopped_well(arm)
+    names = ["learned", "out of budget while doing well", "out of budget"]
+    fate = np.select([curves.learned(arm), well, stopped], names, "not learned").tolist()
+    ends = curves.at(arm, EPISODES)
+    return shared.fate_table(rows[rows["arm"] == arm], curves.seeds, fate, ends)
 
 
 def better(one: np.ndarray, other: np.ndarray, rng: np.random.Generator) -> Evidence:

@@ -1,10 +1,13 @@
 """What the studies of several chapters share: evidence, the seed in the middle, texts."""
 
+from collections.abc import Callable, Mapping, Sequence
+
 import numpy as np
 import pandas as pd
 
 from report.claims import Evidence
 from report.seeds import SEEDS
+from rl_core.evaluation import Agent
 from rl_core.experiments import Results
 from rl_core.statistics import bootstrap_interval, probability_of_improvement
 
@@ -40,6 +43,68 @@ def middle_seed(steps: np.ndarray) -> int:
     """
     order = np.argsort(steps, kind="stable")
     return int(SEEDS[order[(len(order) - 1) // 2]])
+
+
+def shown_seeds(steps: np.ndarray, good: np.ndarray) -> dict[str, int]:
+    """Places of the seeds to show, by a rule: best, middle and worst at the end, first to fail.
+
+    The middle is that of all seeds, the worst that of those that learned.
+
+    Parameters
+    ----------
+    steps : ndarray of shape (seeds,)
+        At the end; infinite where a seed had stopped.
+    good : ndarray of bool, shape (seeds,)
+        Which seeds learned.
+
+    Examples
+    --------
+    >>> shown_seeds(np.array([300, np.inf, 100]), np.array([True, False, True]))
+    {'best': 2, 'middle': 0, 'worst that learned': 0, 'failed': 1}
+    """
+    order = np.argsort(steps, kind="stable")
+    learners = [place for place in order if good[place]]
+    places = {"best": order[0], "middle": order[(len(order) - 1) // 2]}
+    places |= {"worst that learned": learners[-1]} if learners else {}
+    places |= {"failed": np.flatnonzero(~good)[0]} if not good.all() else {}
+    return {text: int(place) for text, place in places.items()}
+
+
+def shown_agents(
+    places: Mapping[str, int], agent: Callable[[int, str], Agent]
+) -> dict[str, tuple[int | None, Agent]]:
+    """The agents of the seeds to show, each with its seed, and the middle one before learning.
+
+    Parameters
+    ----------
+    places : mapping of str to int
+        Of `shown_seeds`.
+    agent : callable
+        Makes one of a place and a moment, as `rl_core.training.weights_of` takes them.
+    """
+    before = {"before learning": (None, agent(places["middle"], "initial/"))}
+    return before | {text: (SEEDS[place], agent(place, "")) for text, place in places.items()}
+
+
+def fate_table(
+    rows: pd.DataFrame, seeds: range, fates: Sequence[str], steps: np.ndarray
+) -> pd.DataFrame:
+    """What became of each seed, as `interactive.seed_curves` takes it.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        An arm's episodes: `seed` and `env_steps`, counted from the first.
+    seeds : range
+        In the order of what follows.
+    fates : sequence of str, of length seeds
+    steps : ndarray of shape (seeds,)
+        At the end; infinite where a seed had stopped.
+    """
+    used = rows.groupby("seed")["env_steps"].max().reindex(seeds).to_numpy(int)
+    end = np.where(np.isinf(steps), np.nan, steps)
+    names = {"seed": list(seeds), "fate": fates, "steps_at_end": end, "env_steps": used}
+    return pd.DataFrame(names)
 
 
 def interval_text(interval: tuple[float, float, float]) -> str:

@@ -5,6 +5,7 @@ index stay with the site. Where a heading lands is known only once it is printed
 printed twice: the second time its contents have page numbers.
 """
 
+import base64
 import re
 import sys
 from collections.abc import Iterator
@@ -49,9 +50,11 @@ STYLE = """
     td, th { overflow-wrap: break-word; white-space: normal !important; padding: 0.2em 0.4em; }
     """
 
-# A film becomes the picture in its middle, with a word on where it moves.
+# A film becomes the picture in its middle, with a word on where it moves; those of single seeds are
+# for the screen.
 STILLS = """
     async () => {
+      document.querySelectorAll('.play-films').forEach(it => it.remove());
       for (const film of document.querySelectorAll('video')) {
         await new Promise(done => {
           film.addEventListener('seeked', done, {once: true});
@@ -95,6 +98,13 @@ def name_of(page: Path, fragment: str) -> str:
     return f"p{page.stem}--{unquote(fragment)}"
 
 
+def address_of(tag: Tag, file: Path) -> str:
+    """Return a file's address; a film, of which a picture is taken, is put into the document."""
+    if tag.name != "video":
+        return file.as_uri()
+    return f"data:video/mp4;base64,{base64.b64encode(file.read_bytes()).decode()}"
+
+
 def article(page: Path, printed: set[Path]) -> Tag:
     """Return what a page says, its links and addresses made fit for the one document."""
     text = BeautifulSoup(page.read_text(encoding="utf-8"), "html.parser").find("article")
@@ -106,7 +116,7 @@ def article(page: Path, printed: set[Path]) -> Tag:
         style.string = style.get_text().replace("#T_", f"#{name_of(page, 'T_')}")
     for tag in text.find_all(src=True):
         if "://" not in tag["src"] and not tag["src"].startswith("data:"):
-            tag["src"] = (page.parent / unquote(tag["src"])).resolve().as_uri()
+            tag["src"] = address_of(tag, (page.parent / unquote(tag["src"])).resolve())
     for link in text.find_all("a", href=True):
         address, fragment = urldefrag(link["href"])
         if "://" in address or address.startswith("mailto:"):

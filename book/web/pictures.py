@@ -20,6 +20,8 @@ CALLS = {
     "captioned": "tables",
     "claims_table": "tables",
     "thumbnails": "pictures",
+    **dict.fromkeys(("maze_widget", "learning_widget"), "pictures"),
+    **dict.fromkeys(("turning", "sigma_knob", "mean_action_snapshots"), "pictures"),
 }
 DIRECTIVES = {"figure": "pictures", "image": "pictures", "table": "tables", "list-table": "tables"}
 SHOWN = {"pictures": "img, svg[role=img]", "films": "video", "tables": "table"}

@@ -1,12 +1,14 @@
 """A Sphinx extension: what all pages of the site have, or have not, beyond the settings.
 
 Pages are light: mathematics only where there are formulas, no script that holds up the first
-picture, of the theme's icon font only what is used, every picture with its size, so that nothing
-moves when it comes.
+picture, of the theme's icon font and styles only what is used, every picture a file of its own with
+its size, so that nothing moves when it comes.
 """
 
 import base64
+import hashlib
 import html
+import os
 import re
 import shutil
 import struct
@@ -19,7 +21,7 @@ from sphinx.application import Sphinx
 from sphinx.config import Config
 
 from report.seeds import FULL, PREVIEW, SEEDS
-from web import icons
+from web import icons, styles
 
 BANNER = (
     f"<strong>Preview with {len(SEEDS)} seeds.</strong> Numbers, intervals and verdicts are not "
@@ -61,6 +63,19 @@ def describe(
     if text:
         tag = f'<meta name="description" content="{html.escape(text)}" />'
         context["metatags"] = context.get("metatags", "") + tag
+
+
+def land_on_pictures(_app: Sphinx, doctree: nodes.document, _page: str) -> None:
+    """Let the address of a caption be that of what stands above it: a link shows both."""
+    for caption in list(doctree.findall(nodes.container)):
+        above = caption.previous_sibling()
+        if "caption" in caption["classes"] and isinstance(above, nodes.container):
+            outputs = [
+                it for it in above.findall(nodes.container) if "cell_output" in it["classes"]
+            ]
+            if outputs:
+                outputs[0]["ids"] += caption["ids"]
+                caption["ids"] = []
 
 
 def is_formula(node: nodes.Node) -> bool:
@@ -105,6 +120,29 @@ def sized(tag: re.Match[str], page: Path) -> str:
     return f'<img width="{width}" height="{height}"{tag[1]}'
 
 
+def set_apart(text: str, page: Path, images: Path) -> str:
+    """Make pictures and films that stand inside a page files of their own: the text comes first.
+
+    Parameters
+    ----------
+    text : str
+        The page's HTML.
+    page, images : Path
+        Where it is, and the folder of the files.
+    """
+
+    def moved(source: re.Match[str]) -> str:
+        data = base64.b64decode(source[2])
+        name = f"{hashlib.sha256(data).hexdigest()[:32]}.{source[1].rpartition('/')[2]}"
+        images.mkdir(exist_ok=True)
+        (images / name).write_bytes(data)
+        return f'src="{os.path.relpath(images, page.parent)}/{name}"'
+
+    text = re.sub(r'(<div class="play-still"><img )', r'\1loading="lazy" ', text)
+    text = text.replace('preload="auto"', 'preload="metadata"')
+    return re.sub(r'src="data:(image/png|video/mp4);base64,([^"]+)"', moved, text)
+
+
 def lightened(text: str, page: Path) -> str:
     """Rewrite a built page: icons, scripts that wait, sizes of pictures, no empty headings.
 
@@ -123,6 +161,12 @@ def lightened(text: str, page: Path) -> str:
         r"<script defer \1",
         head,
     )
+    # Formulas are set when all else is there: `_static/late.js`.
+    head = re.sub(
+        r'<script defer="defer" src="([^"]*mathjax[^"]*)"></script>',
+        r'<meta name="mathjax" content="\1" />',
+        head,
+    )
     body = re.sub(r"<img((?:\s[^>]*)?>)", lambda tag: sized(tag, page), body)
     body = re.sub(r"<th(?:\s[^>]*)?>(?:\s|&nbsp;)*</th>", "<td></td>", body)
     # Read out is what can be read, not another name for it.
@@ -133,7 +177,7 @@ def lightened(text: str, page: Path) -> str:
 
 
 def lighten(app: Sphinx, error: Exception | None) -> None:
-    """Rewrite all pages, and write the icons that they use."""
+    """Rewrite all pages, write the icons that they use, and leave the styles that they use."""
     if error is not None or app.builder.name != "html":
         return
     site = Path(app.outdir)
@@ -141,9 +185,11 @@ def lighten(app: Sphinx, error: Exception | None) -> None:
     for page in pages:
         text = page.read_text(encoding="utf-8")
         if "</head>" in text:
-            page.write_text(lightened(text, page), encoding="utf-8")
+            light = set_apart(lightened(text, page), page, site / "_images")
+            page.write_text(light, encoding="utf-8")
     (site / "_static/icons.css").write_text(icons.style(site), encoding="utf-8")
     shutil.rmtree(site / "_static/vendor/fontawesome")
+    styles.prune(site)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
@@ -151,6 +197,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("config-inited", announce)
     app.connect("builder-inited", without_thebe)
     app.connect("builder-inited", lambda app: app.set_html_assets_policy("per_page"))
+    app.connect("doctree-resolved", land_on_pictures)
     app.connect("html-page-context", describe, priority=900)
     app.connect("build-finished", lighten, priority=900)  # when all files are where they belong
     app.add_css_file("icons.css")

@@ -1,7 +1,7 @@
 // Learning curves: every seed of an arm (chapters 3 to 5), and the arms of one knob (2 and 5).
 (() => {
   const { el, svg, brief, grouped, slider, rove, chart, path, band } = play;
-  const MARKS = { line: ["", "5 3", "2 3", "8 3 2 3"], key: ["solid", "dashed", "dotted", "double"], colour: ["var(--blue)", "var(--vermillion)", "var(--purple)", "var(--orange)"] };
+  const MARKS = { line: ["", "5 3", "2 3", "8 3 2 3", "12 4"], colour: ["var(--blue)", "var(--vermillion)", "var(--purple)", "var(--orange)", "var(--green)"] };
   const exact = (y) => String(y).replace("-", "−");
   const finite = (ys) => ys.filter((y) => y != null);
   const range = (ys, log) => {
@@ -66,17 +66,22 @@
     plot.host.addEventListener("pointermove", nearest);
     plot.host.addEventListener("pointerdown", nearest);
 
+    const cross = (x, y) => svg("path", { class: "cut", d: `M${x - 4} ${y - 4}l8 8m0 -8l-8 8` });
     function paint(layer, X, Y) {
       if (data.original) layer.append(svg("path", { class: "original", d: band(data.original.episode, data.original.low, data.original.high, X, Y) }));
       const line = (it, kind) => svg("path", { class: kind, d: path(data.episode, it.steps, X, Y), "stroke-dasharray": MARKS.line[look(it)], style: `stroke: ${MARKS.colour[look(it)]}` });
       for (const i of shown()) {
         const it = data.seeds[i];
         layer.append(line(it, "seed-line"));
+        for (const j of it.cut) layer.append(cross(X(data.episode[j]), Y(it.steps[j])));
         const end = it.steps.findLastIndex((y) => y != null);
         if (end >= 0 && end < data.episode.length - 1)
-          layer.append(svg("text", { x: X(data.episode[end]), y: Y(it.steps[end]) + 4, "text-anchor": "middle" }, "✕"));
+          layer.append(cross(X(data.episode[end]), Y(it.steps[end])));
       }
-      if (!failedOnly) layer.append(svg("path", { class: "median", d: path(data.episode, data.median, X, Y) }));
+      if (!failedOnly) {
+        const { low, median, high } = data.middle;
+        layer.append(svg("path", { class: "band", d: band(data.episode, low, high, X, Y) }), svg("path", { class: "median", d: path(data.episode, median, X, Y) }));
+      }
       layer.append(svg("path", { class: "halo", d: path(data.episode, data.seeds[picked].steps, X, Y) }), line(data.seeds[picked], "picked-line"));
     }
     function pick(i) {
@@ -92,7 +97,7 @@
         chip.setAttribute("aria-pressed", i === picked);
         chip.tabIndex = i === picked ? 0 : -1;
       });
-      said.textContent = `Seed ${it.seed}: ${it.fate}. ${it.steps_at_end == null ? "No steps" : `${brief(it.steps_at_end)} steps`} at the end; ${grouped(it.env_steps)} environment steps used.`;
+      said.textContent = `Seed ${it.seed}: ${it.fate}. ${it.steps_at_end == null ? "Stopped before the end" : `${brief(it.steps_at_end)} steps at the end`}; ${grouped(it.env_steps)} environment steps used.`;
       const rows = data.episode.map((episode, j) => `${it.seed},${episode},${it.steps[j] ?? ""}`);
       csv.href = `data:text/csv;charset=utf-8,${encodeURIComponent(["seed,episode,steps", ...rows, ""].join("\n"))}`;
       csv.download = `seed_${it.seed}.csv`;
@@ -102,12 +107,14 @@
       plot.draw();
     }
     const key = fates.map((fate, i) => {
-      const colour = `--colour: ${MARKS.colour[i % 4]}; --dash: ${MARKS.key[i % 4]}`;
-      return el("span", { class: "key line", style: colour }, `${fate} (${data.seeds.filter((it) => it.fate === fate).length})`);
+      const line = svg("line", { x1: 0, x2: 28, y1: 6, y2: 6, "stroke-width": 2.5, "stroke-dasharray": MARKS.line[i % MARKS.line.length], style: `stroke: ${MARKS.colour[i % MARKS.colour.length]}` });
+      const sample = svg("svg", { width: 28, height: 12, "aria-hidden": "true" }, line);
+      return el("span", { class: "key drawn" }, sample, `${fate} (${data.seeds.filter((it) => it.fate === fate).length})`);
     });
-    key.push(el("span", { class: "key line strong", style: "--colour: var(--ink)" }, "median of all"));
+    key.push(el("span", { class: "key line strong", style: "--colour: var(--ink)" }, data.middle_name));
     if (data.original) key.push(el("span", { class: "key original" }, "2018 original, one run"));
-    if (data.seeds.some((it) => it.steps.at(-1) == null)) key.push(el("span", {}, "✕ stopped"));
+    if (data.seeds.some((it) => it.cut.length || it.steps.at(-1) == null)) key.push(el("span", {}, "✕ stopped"));
+    if (data.title) live.append(el("p", { class: "play-said title" }, data.title));
     live.append(
       el("div", { class: "play-row" }, toggle, el("span", { class: "play-key" }, "point at a line, or choose a seed (best first; arrow keys)")),
       el("div", { class: "play-seeds", role: "group", "aria-label": "Seeds, best first" }, chips),
@@ -138,8 +145,10 @@
     }
     const measures = data.measures.map((measure) => {
       const value = el("strong", {});
-      const small = chart(`${measure.name} against ${data.name}`, 170, { ...x, ticks: data.values }, { label: "", ...range(finite(measure.values), false) },
+      const small = chart(`${measure.name} against ${data.name}`, 170, { ...x, ticks: data.values }, { label: "", ...range(finite([measure.values, measure.low ?? [], measure.high ?? [], ...(measure.seeds ?? [])].flat()), false) },
         (layer, X, Y, box) => {
+          if (measure.low) layer.append(svg("path", { class: "band", d: band(data.values, measure.low, measure.high, X, Y) }));
+          (measure.seeds ?? []).forEach((each, i) => finite(each).forEach((y) => layer.append(svg("circle", { class: "one-seed", cx: X(data.values[i]), cy: Y(y), r: 2 }))));
           layer.append(
             svg("line", { class: "cursor", x1: X(data.values[at]), x2: X(data.values[at]), y1: box.top, y2: box.bottom }),
             svg("path", { class: "curve", d: path(data.values, measure.values, X, Y) }));

@@ -28,9 +28,23 @@
     const pictures = grids.map(picture);
     const half = (middles) => (middles.at(-1) - middles[0]) / (middles.length - 1) / 2;
     const axis = (middles, label) => ({ label, low: middles[0] - half(middles), high: middles.at(-1) + half(middles) });
+    // Where the sign changes between two cells, their common side is drawn.
+    const border = (grid, X, Y, dx, dy) => {
+      let d = "";
+      const sign = (i, j) => grid[i * columns + j] > 0;
+      for (let i = 0; i < rows; i += 1)
+        for (let j = 0; j < columns; j += 1) {
+          const [right, upper] = [X(data.x[j]) + dx / 2, Y(data.y[i]) - dy / 2];
+          if (j + 1 < columns && sign(i, j) !== sign(i, j + 1)) d += `M${right} ${upper}v${dy}`;
+          if (i + 1 < rows && sign(i, j) !== sign(i + 1, j)) d += `M${right - dx} ${upper}h${dx}`;
+        }
+      return d;
+    };
     const plot = chart(`${data.value_label} against ${data.x_label} and ${data.y_label}`, 330, axis(data.x, data.x_label), axis(data.y, data.y_label), (layer, X, Y, box) => {
       layer.append(svg("image", { href: pictures[at], x: box.left, y: box.top, width: box.right - box.left, height: box.bottom - box.top, preserveAspectRatio: "none", style: "image-rendering: pixelated" }));
       const [dx, dy] = [(box.right - box.left) / columns, (box.bottom - box.top) / rows];
+      layer.append(svg("path", { class: "border", d: border(grids[at], X, Y, dx, dy) }));
+      if (data.mark != null) layer.append(svg("line", { class: "mark", x1: X(data.mark), x2: X(data.mark), y1: box.top, y2: box.bottom }));
       const place = { x: X(data.x[column]) - dx / 2, y: Y(data.y[row]) - dy / 2, width: dx, height: dy };
       layer.append(svg("rect", { class: "spot outer", ...place }), svg("rect", { class: "spot", ...place }));
     });
