@@ -36,7 +36,8 @@ from drawings import look
 from drawings import q_learning as drawings
 from report import provenance
 from report.captions import captioned
-from report.claims import details, multiplicity, record, verdicts
+from report.chance import chance
+from report.claims import criteria, details, record, verdicts, what_it_would_take
 from report.figure_data import offer, tidy
 from report.listings import listing
 from report.seeds import premise
@@ -616,9 +617,10 @@ glue("judging", len(fresh.JUDGING), display=False)
 glue("many", len(fresh.MANY), display=False)
 of_many = others[(others["arm"] == high) & others["seed"].isin(fresh.MANY)]
 glue("stuck_many", int((of_many["lost"] > 0.1).sum()), display=False)
-chance = multiplicity(findings)
-glue("criteria", chance.criteria, display=False)
-glue("by_chance", chance.by_chance, display=False)
+many = chance(criteria(findings))
+glue("criteria", many.criteria, display=False)
+glue("by_chance", many.by_chance, display=False)
+glue("open", what_it_would_take(findings), display=False)
 verdicts = verdicts(findings)
 captioned(verdicts, "Table 2.4. The report's claims about Q-learning.")
 
@@ -631,6 +633,7 @@ captioned(
 
 # %% [markdown]
 # Of {glue:text}`criteria` criteria, about {glue:text}`by_chance:.1f` intervals can be expected to miss what they estimate.
+# Where a criterion is open, so many seeds would tell with a chance of 80%, if the estimates stayed what they are: {glue:text}`open`.
 # Where a claim does not simply hold:
 #
 # - **2b.** It asks for the best of eight probabilities, and how one picks the best matters. The best *of each seed* is partly lucky;

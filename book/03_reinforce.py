@@ -178,7 +178,7 @@ offer("figure_s3_3", few.table[["seed", "episode", "steps"]])
 # Both engines begin with the same weights and draw the same random numbers.
 
 # %% tags=["hide-input"] mystnb={"image": {"alt": "Steps an episode of one seed, compiled and in torch: the same curve first, then two that part."}}
-middle = study.shown_seeds(curves, "Acrobot, as reported")["middle"]
+middle = study.shown_places(curves, "Acrobot, as reported")["middle"]
 engines = study.same_seed(RESULTS / "store", int(study.SEEDS[middle]))
 seconds = engines.provenance.set_index("arm")["processor_seconds"]
 parted = study.parting(engines)
@@ -426,7 +426,7 @@ def film(name, env_id):
     arm = f"{name}, as reported"
     config = next(a.config for a in study.arms() if a.name == arm)
     arrays = results.arrays(arm)
-    places = study.shown_seeds(curves, arm)
+    places = study.shown_places(curves, arm)
     episodes = {}
     for text, place in places.items():
         agent = as_learned(config, weights_of(arrays, place))
@@ -460,7 +460,7 @@ film("MountainCar", "MountainCar-v0")
 
 # %% tags=["hide-input"]
 captioned(
-    study.wall_clock(results, {"Acrobot": 2, "MountainCar": 3}),
+    study.seconds(results),
     "Table 3.6. Time for one run: in the report by the clock (its machine unknown), now of the processor.",
     formats={"2018 (s)": "{:.0f}", "now (s, mean)": "{:.1f}", "now, all seeds (s)": "{:.0f}"},
 )
@@ -474,7 +474,8 @@ captioned(
 
 # %%
 findings = study.findings(curves, fresh, near)
-record(findings, RESULTS, chapter="3")
+about = study.about(findings, curves, near)
+record(findings, RESULTS, chapter="3", about=about)
 captioned(verdicts(findings), "Table 3.7. The report's claims about REINFORCE.")
 
 # %% tags=["hide-input"]
@@ -485,8 +486,8 @@ captioned(
 
 # %% tags=["hide-input"]
 captioned(
-    study.windows(curves, near),
-    'Table 3.9. How wide is "about"? The share of seeds inside, and whether the median over all seeds is.',
+    about,
+    'Table 3.9. How wide is "about"? The share of seeds inside, and the verdict.',
     formats={"window": "{:.0%}", "low": "{:.0f}", "high": "{:.0f}", "share": "{:.0%}"},
 )
 

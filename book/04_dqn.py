@@ -192,10 +192,12 @@ captioned(
 )
 
 # %% tags=["hide-input"]
+findings = study.findings(curves)
+about = study.about(findings, curves)
 captioned(
-    study.about(curves),
+    about,
     'Table 4.4. What hangs on the meaning of "about" in 3f and 3g: half the width of the window, as a share of the reported steps; the share of seeds inside '
-    "it; and whether the median of all seeds is.",
+    "it; and the verdict.",
     formats={"window": "{:.0%}", "low": "{:.0f}", "high": "{:.0f}", "share": "{:.0%}"},
 )
 
@@ -339,7 +341,6 @@ drawings.profiles(of_arm, random)
 # :::
 
 # %% tags=["remove-cell"]
-findings = study.findings(curves)
 said = {finding.claim.id: finding.evidence for finding in findings}
 for claim in ("3i", "3j", "3k"):
     for k, evidence in enumerate(said[claim], 1):
@@ -548,8 +549,8 @@ for title, arm in (
     ("Shaped reward", "MountainCar, as reported"),
     ("Original, all mended", "MountainCar, original, all four"),
 ):
-    position = study.median_seed(curves, arm)
-    weights = weights_of(results.arrays(arm), position)
+    place = study.middle(curves, arm)
+    weights = weights_of(results.arrays(arm), place)
     policies[title] = (
         weights,
         rollout("MountainCar-v0", of_values(weights), np.random.default_rng(0), 1_000),
@@ -570,13 +571,13 @@ drawings.state_plane(policies)
 # %% tags=["hide-input"]
 def film(name, text):
     arm = f"{name}, as reported"
-    position, arrays = study.median_seed(curves, arm), results.arrays(arm)
-    trained, untrained = (weights_of(arrays, position, moment) for moment in ("", "initial/"))
+    place, arrays = study.middle(curves, arm), results.arrays(arm)
+    trained, untrained = (weights_of(arrays, place, moment) for moment in ("", "initial/"))
     # The trained agent acts as it did at the end of its training, one action in ten at random.
     after = rollout(study.ENV[name], of_values(trained, 0.1), np.random.default_rng(0), 1_000)
     long = len(after.rewards)
     before = rollout(study.ENV[name], of_values(untrained, 0.9), np.random.default_rng(0), long)
-    glue(f"{name}-seed", study.SEEDS[position], display=False)
+    glue(f"{name}-seed", study.SEEDS[place], display=False)
     return before_and_after(study.ENV[name], before, after, description=text)
 
 
@@ -607,9 +608,9 @@ film(
 
 # %% tags=["hide-input"]
 captioned(
-    study.wall_clock(results),
+    study.seconds(results),
     "Table 4.9. Time for one run, in the report (its machine unknown) and now, on one core.",
-    formats={"2018 (s)": "{:.0f}", "now (s, mean)": "{:.1f}", "now, all (s)": "{:.0f}"},
+    formats={"2018 (s)": "{:.0f}", "now (s, mean)": "{:.1f}", "now, all seeds (s)": "{:.0f}"},
 )
 
 # %% [markdown]
@@ -621,7 +622,7 @@ captioned(
 # means within a quarter. Intervals are 95% intervals over seeds.
 
 # %%
-record(findings, RESULTS, chapter="4")
+record(findings, RESULTS, chapter="4", about=about)
 captioned(verdicts(findings), "Table 4.10. The report's claims about DQN.")
 
 # %% tags=["hide-input"]

@@ -195,7 +195,7 @@ def test_measures_by_hand():
     np.testing.assert_array_equal(curves.spread("as reported"), [0, 0, *[np.inf] * 3])
     assert curves.final_return("as reported")[0] == pytest.approx(100 - 0.1 * SIGMA**2 * 200)
     assert np.isneginf(curves.final_return("as reported")[2:]).all()
-    assert study.median_seed(curves, "as reported") == 0
+    assert study.middle(curves, "as reported") == 0
 
 
 def all_arms(level):

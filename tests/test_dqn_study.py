@@ -215,7 +215,8 @@ def test_seeds_are_counted_by_thresholds_and_windows(monkeypatch):
     curves = study.Curves(pd.concat([arm_rows(arm.name) for arm in study.arms()]))
     assert study.within(curves, "Acrobot, as reported", 60, 100) == [10, 10, 10]
     assert study.goals(curves, "MountainCar, original") == (12, 12 * (45_000 // 240))
-    shares = study.about(curves).groupby("claim")["share"].apply(list).to_dict()
+    about = study.about(study.findings(curves), curves)
+    shares = about.groupby("claim")["share"].apply(list).to_dict()
     assert shares == {"3f": [10 / 12] * 3, "3g": [0.0] * 3}
     table = study.mended_alone_or_not(curves).set_index("cause")
     assert table.loc["all four", "Acrobot: it alone"] == "12 of 12"

@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
-import pytest
 
 from studies import reinforce as study
 
@@ -107,11 +106,6 @@ def test_seeds_are_compared_with_themselves():
     assert column["MountainCar, raw returns"] == "0 [0, 0]"
 
 
-@pytest.mark.parametrize(("interval", "text"), [((-3.0, -np.inf, 4.0), "−3 [−∞, 4]")])
-def test_intervals_have_signs(interval, text):
-    assert study._interval(interval) == text
-
-
 def test_what_is_seen_of_the_cars_is_all_there_is():
     assert study.sees_all("MountainCar-v0", steps=200) < 1e-6
 
@@ -135,11 +129,11 @@ def ending(*steps):
 
 
 def test_seeds_to_show_are_chosen_by_rule():
-    shown = study.shown_seeds(ending(300, np.inf, 100, 200, np.inf), "")
+    shown = study.shown_places(ending(300, np.inf, 100, 200, np.inf), "")
     assert shown == {"best": 2, "middle": 0, "worst that learned": 0, "failed": 1}
-    assert study.shown_seeds(ending(9, 5), "") == {
+    assert study.shown_places(ending(9, 5), "") == {
         "best": 1,
         "middle": 1,
         "worst that learned": 0,
     }
-    assert study.shown_seeds(ending(np.inf, np.inf), "")["failed"] == 0
+    assert study.shown_places(ending(np.inf, np.inf), "")["failed"] == 0

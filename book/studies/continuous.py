@@ -441,21 +441,18 @@ def _text(interval: Interval) -> str:
     return interval_text(interval)
 
 
-def wall_clock(results: Results) -> pd.DataFrame:
+def seconds(results: Results) -> pd.DataFrame:
     """Seconds one seed took, here and in the report."""
-    arms = {"as reported": (f"{ENV}, as reported, one seed", 60 * REPORTED_MINUTES)}
-    return shared.wall_clock(results, arms, "now, all seeds (s)")
+    return shared.seconds(
+        results, {"as reported": (f"{ENV}, as reported, one seed", 60 * REPORTED_MINUTES)}
+    )
 
 
-def median_seed(curves: Curves, arm: str) -> int:
-    """The seed in the middle of those that learned, by their steps at the end.
-
-    If none learned, of all seeds: a rule, not a pick.
-    """
+def middle(curves: Curves, arm: str) -> int:
+    """Place of the seed in the middle of those that learned, or of all if none did."""
     good = curves.learned(arm)
-    steps = np.where(good, curves.at(arm), np.inf)
-    order = np.argsort(steps, kind="stable")
-    return int(SEEDS[order[(max(int(good.sum()), 1) - 1) // 2]])
+    places = np.flatnonzero(good) if good.any() else np.arange(len(good))
+    return int(places[shared.middle(curves.at(arm)[places])])
 
 
 def findings(curves: Curves, fresh: Curves) -> list[Finding]:

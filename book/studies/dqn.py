@@ -27,11 +27,12 @@ from rl_core.statistics import (
     episodes_to_threshold,
     learned,
     learning_curves,
-    probability_of_improvement,
     proportion_interval,
 )
 from rl_core.training import weights_of
 from rl_core.worlds.shaping import Shaping
+from studies import shared
+from studies.shared import interval_text, lower_evidence, median_evidence
 
 EPISODES = 100  # of figures 12 and 13
 BUDGET = {"Acrobot": 25_000, "MountainCar": 45_000}  # environment steps a seed, for the causes
@@ -310,11 +311,6 @@ class Curves:
         return tuple(proportion_interval(count, len(SEEDS)))
 
 
-def _interval(interval: tuple[float, float, float]) -> str:
-    estimate, low, high = (_steps(x) for x in interval)
-    return f"{estimate} [{low}, {high}]"
-
-
 def _steps(value: float) -> str:
     return "∞" if np.isinf(value) else f"{value:,.0f}"
 
@@ -327,7 +323,7 @@ def milestones(curves: Curves) -> pd.DataFrame:
         row = {"arm": arm}
         for episode in MILESTONES:
             interval = bootstrap_interval(curves.at(arm, episode), rng=rng)
-            row[f"steps at {episode}"] = _interval(interval)
+            row[f"steps at {episode}"] = interval_text(interval)
         for episode in (MILESTONES[0], EPISODES):
             count = int(curves.learned(arm, episode).sum())
             row[f"learned by {episode}"] = f"{count} of {len(SEEDS)}"
@@ -345,7 +341,7 @@ def to_the_budget(curves: Curves, variants: Sequence[str]) -> pd.DataFrame:
         for name in ENV:
             arm = f"{name}, {variant}"
             interval = bootstrap_interval(curves.steps_a_goal(arm), rng=rng)
-            row[f"{name}: steps a goal"] = _interval(interval)
+            row[f"{name}: steps a goal"] = interval_text(interval)
             share, low, high = curves.share(arm)
             count = round(share * len(SEEDS))
             row[f"{name}: learned"] = f"{count} of {len(SEEDS)} ({low:.0%} to {high:.0%})"
@@ -410,16 +406,15 @@ def as_trained(results: Results) -> dict[str, dict[float, np.ndarray]]:
     }
 
 
-def about(curves: Curves) -> pd.DataFrame:
+def about(findings: Sequence[Finding], curves: Curves) -> pd.DataFrame:
     """What becomes of 3f and 3g where "about" means more, or less."""
-    rng = np.random.default_rng(np.random.SeedSequence(2022))
-    tables = []
-    for claim, (name, steps) in zip(("3f", "3g"), REPORTED.items(), strict=True):
-        at_20 = curves.at(f"{name}, as reported", MILESTONES[0])
-        table = sensitivity(steps, at_20, _evidence(at_20, rng))
-        tables.append(table.assign(claim=claim, about=steps))
-    columns = ["claim", "about", "window", "low", "high", "share", "answer"]
-    return pd.concat(tables, ignore_index=True)[columns]
+    found = {one.claim.id: one for one in findings}
+    pairs = zip(("3f", "3g"), REPORTED.items(), strict=True)
+    tables = [
+        sensitivity(found[claim], steps, curves.at(f"{name}, as reported", MILESTONES[0]))
+        for claim, (name, steps) in pairs
+    ]
+    return pd.concat(tables, ignore_index=True)
 
 
 def within(curves: Curves, arm: str, low: float, high: float) -> list[int]:
@@ -519,30 +514,17 @@ def greedy_steps(
     return np.array(medians)
 
 
-def wall_clock(results: Results) -> pd.DataFrame:
+def seconds(results: Results) -> pd.DataFrame:
     """Seconds one seed took, here and in the report."""
-    made = results.provenance
-    rows = []
-    for name, seconds in SECONDS.items():
-        of_arm = made[made["arm"] == f"{name}, as reported"]
-        rows.append(
-            {
-                "experiment": f"{name}, DQN, {EPISODES} episodes of one seed",
-                "2018 (s)": seconds,
-                "now (s, mean)": of_arm["seconds"].mean(),
-                "now, all (s)": of_arm["seconds"].sum(),
-                "processor": of_arm["processor"].iloc[0],
-            }
-        )
-    return pd.DataFrame(rows)
+    names = {name: f"{name}, DQN, {EPISODES} episodes of one seed" for name in SECONDS}
+    arms = {f"{name}, as reported": (names[name], SECONDS[name]) for name in SECONDS}
+    return shared.seconds(results, arms)
 
 
-def median_seed(curves: Curves, arm: str) -> int:
-    """Position of the seed in the middle, all ordered by their steps at the end: not a pick."""
+def middle(curves: Curves, arm: str) -> int:
+    """Place of the seed in the middle, all ordered by their steps at the end."""
     reported_arm = arm in curves.smooth
-    steps = curves.at(arm, EPISODES) if reported_arm else curves.steps_a_goal(arm)
-    order = np.argsort(steps, kind="stable")
-    return int(order[(len(order) - 1) // 2])
+    return shared.middle(curves.at(arm, EPISODES) if reported_arm else curves.steps_a_goal(arm))
 
 
 def premises(curves: Curves) -> dict[str, bool]:
@@ -626,11 +608,10 @@ def findings(curves: Curves) -> list[Finding]:
 
     def about(arm: str, episode: int) -> tuple[Evidence, Evidence]:
         steps, good = curves.at(arm, episode), curves.learned(arm, episode)
-        return _evidence(steps, rng), _evidence(steps[good], rng)
+        return median_evidence(steps, rng), median_evidence(steps[good], rng)
 
     def better(one: str, other: str, measure: Callable[[str], np.ndarray]) -> Evidence:
-        interval = probability_of_improvement(measure(one), measure(other), rng=rng)
-        return Evidence(*interval, seeds=len(SEEDS))
+        return lower_evidence(measure(one), measure(other), rng)
 
     def share(arm: str) -> Evidence:
         return Evidence(*curves.share(arm), seeds=len(SEEDS))
@@ -661,10 +642,3 @@ def findings(curves: Curves) -> list[Finding]:
         three_k.judge(*k),
         three_l.judge(*cause),
     ]
-
-
-def _evidence(values: np.ndarray, rng: np.random.Generator) -> Evidence:
-    """Median with its interval; for no seeds at all, everything is possible, as in chapter 5."""
-    if len(values) == 0:
-        return Evidence(np.inf, -np.inf, np.inf, seeds=0)
-    return Evidence(*bootstrap_interval(values, rng=rng), seeds=len(values))
