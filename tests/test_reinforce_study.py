@@ -79,22 +79,15 @@ def test_no_seed_is_left_out_and_fresh_claims_see_fresh_seeds():
 
 
 def test_the_questions_are_answered_by_what_the_arms_did():
-    """One arm runs away at once; reported seeds that used a million steps up count as failed."""
+    """One arm runs away at once, one never gets to 500 steps."""
 
     def fresh(arm, seed):
-        return {
-            "MountainCar, raw returns, one epoch": 600_000,
-            "Acrobot, gamma 0.9, alpha 0.003": 900,
-        }.get(arm, 100)
+        steps = {"raw returns, one epoch": 600_000, "one epoch": 900}
+        return steps.get(arm.removeprefix("MountainCar, "), 100)
 
-    curves = study.Curves(fresh_table(fresh), study.FRESH)
-    few, many = (
-        [piece.estimate for piece in study.answers(curves, near_table(lambda arm, seed, n=n: n))]
-        for n in (99, 999)
-    )
-    assert few == [1, 0, 0, 0.5, 1, 1]
-    assert many == [1, 0, 0, 0.5, 0, 0]
-    assert len(study.QUESTIONS) == len(few)
+    found = study.answers(study.Curves(fresh_table(fresh), study.FRESH))
+    assert [piece.estimate for piece in found] == [1, 0, 0, 1]
+    assert len(study.QUESTIONS) == len(found)
 
 
 def test_seeds_are_compared_with_themselves():

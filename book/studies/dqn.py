@@ -217,6 +217,7 @@ CLAIMS = (
             )
         ),
         "Figure S4.1",
+        amended="Acrobot's criteria are near their bound, so judged on seeds 100 to 249 instead",
     ),
     Claim(
         "3j",
@@ -231,7 +232,7 @@ CLAIMS = (
             )
             for name in ENV
         ),
-        "Table 4.2",
+        "Table 4.5",
     ),
     Claim(
         "3k",
@@ -245,7 +246,8 @@ CLAIMS = (
             )
             for name in ENV
         ),
-        "Table 4.2",
+        "Table 4.5",
+        amended="Acrobot's criterion is near its bound, so judged on seeds 100 to 249 instead",
     ),
     Claim(
         "3l",
@@ -275,15 +277,15 @@ CLAIMS = (
 class Curves:
     """Steps per episode of the reported arms, and steps a goal at the end of every arm."""
 
-    def __init__(self, table: pd.DataFrame) -> None:
-        by_arm = {str(arm): rows for arm, rows in table.groupby("arm", sort=False)}
-        self.table = by_arm
+    def __init__(self, table: pd.DataFrame, seeds: Sequence[int] | None = None) -> None:
+        self.seeds = SEEDS if seeds is None else seeds
+        self.table = {str(arm): rows for arm, rows in table.groupby("arm", sort=False)}
         self.raw, self.smooth = {}, {}
-        for name in ENV:
-            arm = f"{name}, as reported"
-            shape = {"seeds": SEEDS, "episodes": EPISODES}
-            self.raw[arm] = learning_curves(by_arm[arm], **shape)
-            self.smooth[arm] = learning_curves(by_arm[arm], window=WINDOW, **shape)
+        for arm in (f"{name}, as reported" for name in ENV):
+            if arm in self.table:
+                shape = {"seeds": self.seeds, "episodes": EPISODES}
+                self.raw[arm] = learning_curves(self.table[arm], **shape)
+                self.smooth[arm] = learning_curves(self.table[arm], window=WINDOW, **shape)
 
     def at(self, arm: str, episode: int) -> np.ndarray:
         """Steps of each seed at an episode; infinite where the seed had stopped before."""
@@ -298,7 +300,7 @@ class Curves:
         """Steps a goal of each seed in a part of the budget."""
         budget, rows = BUDGET[arm.partition(",")[0]], self.table[arm]
         of_seed = dict(list(rows.groupby("seed")))
-        return np.array([steps_a_goal(of_seed[seed], budget, start, end) for seed in SEEDS])
+        return np.array([steps_a_goal(of_seed[seed], budget, start, end) for seed in self.seeds])
 
     def parts(self, arm: str) -> np.ndarray:
         """Steps a goal of each seed in each tenth of the budget, of shape (seeds, tenths)."""
@@ -308,7 +310,7 @@ class Curves:
     def share(self, arm: str) -> tuple[float, float, float]:
         """Share of seeds that learned, by their steps a goal at the end, with its interval."""
         count = int((self.steps_a_goal(arm) <= LEARNED).sum())
-        return tuple(proportion_interval(count, len(SEEDS)))
+        return tuple(proportion_interval(count, len(self.seeds)))
 
 
 def _steps(value: float) -> str:
@@ -602,33 +604,33 @@ def premises_of_replay(curves: Curves) -> dict[str, bool]:
     }
 
 
-def findings(curves: Curves) -> list[Finding]:
-    """Hold the seeds against the criteria."""
+def findings(curves: Curves, near: Curves) -> list[Finding]:
+    """Hold the seeds against the criteria: Acrobot's of 3i and 3k against those of `near`."""
     rng = np.random.default_rng(np.random.SeedSequence(2019))
 
     def about(arm: str, episode: int) -> tuple[Evidence, Evidence]:
         steps, good = curves.at(arm, episode), curves.learned(arm, episode)
         return median_evidence(steps, rng), median_evidence(steps[good], rng)
 
-    def better(one: str, other: str, measure: Callable[[str], np.ndarray]) -> Evidence:
-        return lower_evidence(measure(one), measure(other), rng)
+    def better(
+        one: str, other: str, measure: Callable[[Curves, str], np.ndarray], of: Curves = curves
+    ) -> Evidence:
+        return lower_evidence(measure(of, one), measure(of, other), rng)
 
     def share(arm: str) -> Evidence:
         return Evidence(*curves.share(arm), seeds=len(SEEDS))
 
-    def to_200(arm: str) -> np.ndarray:
-        return tenths_to_200(curves, arm)
-
     three_f, three_g, three_h, three_i, three_j, three_k, three_l = CLAIMS
-    goal = curves.steps_a_goal
+    goal = Curves.steps_a_goal
     h, i, j, k, cause = [], [], [], [], []
     for name in ENV:
         shaped, original = f"{name}, shaped", f"{name}, original"
+        of = near if name == "Acrobot" else curves
         pair = shaped, f"{shaped}, gamma 0.9"
         h += [share(original), better(shaped, original, goal)]
-        i += [better(*pair, goal), better(*pair, to_200)]
+        i += [better(*pair, goal, of), better(*pair, tenths_to_200, of)]
         j.append(better(shaped, f"{shaped}, no replay", goal))
-        k.append(better(shaped, f"{shaped}, no fixed target", goal))
+        k.append(better(shaped, f"{shaped}, no fixed target", goal, of))
         cause += [
             share(f"{original}, all four"),
             better(f"{original}, no replay", original, goal),
