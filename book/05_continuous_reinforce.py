@@ -353,7 +353,7 @@ captioned(
 
 # %% [markdown]
 # The guess explains a part at most. With γ = 0.9, one update an episode loses {glue:text}`lost dis one` of {glue:text}`seeds` seeds, many lose {glue:text}`lost dis many`. With raw returns it is {glue:text}`lost raw one` against {glue:text}`lost raw many`.
-# One update with ten times the step loses {glue:text}`lost raw10 one` with raw returns and {glue:text}`lost dis10 one` with γ = 0.9. No criterion is met. That Adam's step does not shrink with the gradient may play its part; this was not tested.
+# One update with ten times the step loses {glue:text}`lost raw10 one` with raw returns and {glue:text}`lost dis10 one` with γ = 0.9. No criterion is met. That Adam's step does not shrink with the gradient may play its part. This is a guess; no other optimiser was tried.
 #
 # ### What the mean can express
 #
@@ -421,7 +421,7 @@ glue("learned-sigma", what_became.learned_sigma(curves, results), display=False)
 # {glue:text}`return as reported:.0f`, {glue:text}`return sigma 0.5:.0f` and {glue:text}`return sigma 1:.0f`. Whoever looks at the steps and whoever looks at the return need not agree on the best σ.
 #
 # Where σ is learned, seeds that learn end with σ = {glue:text}`learned-sigma` (median and range), having begun at 0.5, and with a return of {glue:text}`return sigma learned:.0f`. The cost pulls σ down, since
-# wide noise is paid for at every step. A guess at what follows: once the mean gets the car out by itself, this is a gain; where σ shrinks before, the car no longer gets out.
+# wide noise is paid for at every step. What follows is a guess. If the mean gets the car out by itself, less noise is a gain. If σ shrinks before the mean can do that, the car no longer gets out.
 #
 # ### Without the noise
 #
@@ -589,7 +589,8 @@ glue("closest", best, display=False)
 glue("closest-steps", float(np.median(curves.at(best, 3_000)[curves.learned(best)])), display=False)
 
 # %% [markdown]
-# Where a criterion is "open", the interval holds the bound. If estimates stayed what they are, it would take about so many seeds to tell: {glue:text}`open`. (No number: the estimate is the bound itself, or the interval has no end.)
+# Where a criterion is "open", the interval holds the bound. If estimates stayed what they are, it would take about so many seeds to tell with a chance of 80%: {glue:text}`open`. Where a criterion
+# is about the seeds that learned, these are what is counted, so that more have to be run. (No number: the estimate is the bound itself, or the interval has no end.)
 #
 # Claim 4b has a criterion that is close to its bound: {glue:text}`nearest` against one half. With σ = 0.3, the seeds that ever need no more than 300 steps are {glue:text}`there` of {glue:text}`seeds` (Fisher's exact test: p = {glue:text}`fisher`).
 # So few seeds carry this one; more were not run, as a hundred seeds of both arms would cost more than six arms of this chapter.

@@ -7,18 +7,22 @@ its two angles and two speeds was tuned as those of the cars were. On seeds 1000
 10 and 12 bins a dimension and step sizes 0.1 and 0.3, 6 bins and 0.3 needed the fewest steps.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from report.seeds import FULL, SEEDS
 from rl_core.evaluation import as_learned, evaluate, evaluate_table
 from rl_core.experiments import Arm, Results, run
 from rl_core.q_learning import q_learning
+from rl_core.statistics import bootstrap_interval
 from rl_core.training import weights_of
 from rl_core.worlds.discretise import gridded
 from studies import evaluation as first
 from studies import reinforce as reinforce_study
+from studies.shared import interval_text
 
 FRESH = range(100, 100 + len(SEEDS))
 NEAR_A_BOUND = range(100, 100 + 100 * len(SEEDS) // FULL)
@@ -69,3 +73,14 @@ def mean_steps(cars: Results, acrobot: Results) -> dict[str, np.ndarray]:
     played = [evaluate(network.env, a, seed=s, **rules) for a, s in zip(agents, FRESH, strict=True)]
     found[network.name] = np.array([one["steps"].mean() for one in played])
     return found
+
+
+def compared(found: Mapping[str, np.ndarray]) -> pd.DataFrame:
+    """One row an arm: its seeds, their median steps with the interval, and how many learned."""
+    rng = np.random.default_rng(np.random.SeedSequence(2028))
+    rows = []
+    for arm, steps in found.items():
+        middle = interval_text(bootstrap_interval(steps, rng=rng))
+        learned = int((steps <= first.LEARNED).sum())
+        rows.append({"arm": arm, "seeds": len(steps), "steps": middle, "learned": learned})
+    return pd.DataFrame(rows)

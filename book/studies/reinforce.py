@@ -51,6 +51,7 @@ NEAR_A_BOUND = range(100, 100 + 100 * len(SEEDS) // FULL)
 SHORT = 1_000_000  # environment steps, where that is enough to see what becomes of a seed
 TORCH_EPISODES = 300
 RUN_AWAY = 500_000  # steps: a seed with an episode longer than this has run away
+UNITS = (10, 20, 30, 64, 128)  # of a single layer
 PAIRED = "against as reported at 2,000, same seed"
 REPORTED_MINUTES = {"Acrobot": 2, "MountainCar": 3}
 REPORTED_AT = {"Acrobot": 1_000, "MountainCar": 1_500}  # the episodes of the report's numbers
@@ -68,11 +69,7 @@ VARIANTS = {
 TRIALS = {
     "MountainCar": {
         "as reported": {},
-        "one layer of 10": {"network": MLP((10,))},
-        "one layer of 20": {"network": MLP((20,))},
-        "one layer of 30": {"network": MLP((30,))},
-        "one layer of 64": {"network": MLP((64,))},
-        "one layer of 128": {"network": MLP((128,))},
+        **{f"one layer of {units}": {"network": MLP((units,))} for units in UNITS},
         "one epoch": {"epochs": 1},
         "returns centred": {"normalise": "centre"},
         "raw returns, one epoch": {"normalise": "none", "epochs": 1, "max_env_steps": SHORT},
