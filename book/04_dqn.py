@@ -235,7 +235,7 @@ premise(
 #
 # **Does it need its random actions?** The last networks were tried in 20 new episodes of at most 1,000 steps each, once as trained, one action in ten at random, and once greedily.
 # As trained the median seed takes {glue:text}`MountainCar at 0.1` steps on MountainCar, and {glue:text}`MountainCar lost at 0.1` seeds do not arrive in half of their episodes or more.
-# Greedily it takes {glue:text}`MountainCar at 0.0`, and {glue:text}`MountainCar lost at 0.0` do not arrive: these circle in the valley until a random push sets them free. On Acrobot the steps are
+# Greedily it takes {glue:text}`MountainCar at 0.0`, and {glue:text}`MountainCar lost at 0.0` do not arrive. So some need a random push now and then. On Acrobot the steps are
 # {glue:text}`Acrobot at 0.1` and {glue:text}`Acrobot at 0.0`, and {glue:text}`Acrobot lost at 0.1` and {glue:text}`Acrobot lost at 0.0` seeds do not arrive.
 #
 # ## One seed in torch

@@ -54,4 +54,5 @@ def test_fresh_seeds_decide_where_the_first_were_near_the_bound(monkeypatch):
 
 
 def test_the_seeds_are_fresh():
-    assert min(study.NEAR_A_BOUND) == min(study.FRESH) == 100
+    assert min(study.NEAR_A_BOUND) == 100
+    assert set(study.OF_ANGLES) < set(study.NEAR_A_BOUND) - set(range(100, 103))

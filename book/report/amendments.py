@@ -240,8 +240,17 @@ AMENDMENTS = [
         "the shares of seeds that learn, near their bound, judged on further seeds alone, once; a "
         "second reading, Acrobot by its angles and speeds",
         True,
+        "two criteria, from open to met",
+        "seeds 100 to 199; the second reading first 100 to 129",
+    ),
+    Amendment(
+        "second edition",
+        "3n",
+        "the second reading's criterion on Acrobot, open on seeds 100 to 129, judged on further "
+        "seeds alone, once",
+        True,
         "see chapter 6",
-        "seeds 100 to 199; the second reading 100 to 129",
+        "seeds 130 to 199",
     ),
     Amendment(
         "second edition",

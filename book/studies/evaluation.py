@@ -471,7 +471,7 @@ CLAIMS = (
             ),
         ),
         amended="the shares of seeds are near their bound, so judged on seeds 100 to 199 instead; "
-        "a second reading, on seeds 100 to 129",
+        "a second reading, on seeds 130 to 199",
     ),
     Claim(
         "t",

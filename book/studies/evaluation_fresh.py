@@ -4,7 +4,9 @@ Nobody had looked at these seeds when the criteria stood. Of the first thirty, 2
 car learned: that is near the bound of four in five, so that a hundred others decide, once and
 alone. What Acrobot shows are six numbers, of which a sine and a cosine belong together; a table on
 its two angles and two speeds was tuned as those of the cars were. On seeds 1000 to 1003, of 6, 8,
-10 and 12 bins a dimension and step sizes 0.1 and 0.3, 6 bins and 0.3 needed the fewest steps.
+10 and 12 bins a dimension and step sizes 0.1 and 0.3, 6 bins and 0.3 needed the fewest steps. Seeds
+100 to 129 left open whether it is as good as the network: the ratio of steps was 1.02, from 0.86 to
+1.35, against a bound of 1.25. So seeds 130 to 199 decide, once and alone.
 """
 
 from collections.abc import Mapping
@@ -24,8 +26,8 @@ from studies import evaluation as first
 from studies import reinforce as reinforce_study
 from studies.shared import interval_text
 
-FRESH = range(100, 100 + len(SEEDS))
 NEAR_A_BOUND = range(100, 100 + 100 * len(SEEDS) // FULL)
+OF_ANGLES = NEAR_A_BOUND[len(SEEDS) :]
 CARS = ("MountainCar", "MountainCarContinuous")
 ANGLES = "studies.acrobot_angles:AcrobotAngles"
 ANGLE_BINS = 6  # in each of four dimensions: 1,296 cells
@@ -47,7 +49,7 @@ def learn(store: Path) -> tuple[Results, Results]:
     """Run what the store does not have: the cars, and Acrobot."""
     return (
         run(arms_of_cars(), seeds=NEAR_A_BOUND, store=store),
-        run(arms_of_acrobot(), seeds=FRESH, store=store),
+        run(arms_of_acrobot(), seeds=OF_ANGLES, store=store),
     )
 
 
@@ -60,7 +62,7 @@ def mean_steps(cars: Results, acrobot: Results) -> dict[str, np.ndarray]:
     found = {}
     for results, arms, seeds in (
         (cars, arms_of_cars(), NEAR_A_BOUND),
-        (acrobot, arms_of_acrobot()[:1], FRESH),
+        (acrobot, arms_of_acrobot()[:1], OF_ANGLES),
     ):
         for arm in arms:
             levels = first.LEVELS[first.environment_of(arm.name)]
@@ -69,8 +71,10 @@ def mean_steps(cars: Results, acrobot: Results) -> dict[str, np.ndarray]:
             played = [evaluate_table(world, Q, seed=seed, **rules) for Q, seed in tables]
             found[arm.name] = np.array([one["steps"].mean() for one in played])
     network, arrays = arms_of_acrobot()[1], acrobot.arrays("Acrobot, as reported")
-    agents = [as_learned(network.config, weights_of(arrays, i)) for i in range(len(FRESH))]
-    played = [evaluate(network.env, a, seed=s, **rules) for a, s in zip(agents, FRESH, strict=True)]
+    agents = [as_learned(network.config, weights_of(arrays, i)) for i in range(len(OF_ANGLES))]
+    played = [
+        evaluate(network.env, a, seed=s, **rules) for a, s in zip(agents, OF_ANGLES, strict=True)
+    ]
     found[network.name] = np.array([one["steps"].mean() for one in played])
     return found
 
