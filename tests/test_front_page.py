@@ -102,10 +102,10 @@ def test_both_numbers_are_shown_where_the_verdict_depends_on_the_reading():
 def test_a_verdict_that_hangs_on_the_meaning_of_about_is_marked():
     words = "15%: does not hold; 25%: cannot tell; 35%: holds"
     page = front_page.claims_table(FOUND.assign(about=[words, np.nan, np.nan]))
-    assert page.count(f'<div class="readings">“About” is {words}</div>') == 1
+    assert page.count(f'<div class="readings">“About” within {words}</div>') == 1
     page = front_page.claims_table(FOUND)  # where all three agree it stands behind the click only
-    assert page.count("“About” within: 15%: does not hold;") == 1
-    assert "“About” is" not in page
+    assert page.count("<p>“About” within: 15%: does not hold;") == 1
+    assert '<div class="readings">' not in page
 
 
 def test_what_a_table_says_is_text():

@@ -185,7 +185,7 @@ def _row(row: pd.Series) -> str:
     if row["verdict"] == "depends on the reading":
         claim += f'<div class="readings">{html.escape(row["readings"])}</div>'
     if len(set(re.findall(r": ([^;]+)", str(row["about"])))) > 1:
-        claim += f'<div class="readings">“About” is {html.escape(row["about"])}</div>'
+        claim += f'<div class="readings">“About” within {html.escape(row["about"])}</div>'
     name = html.escape(row["id"])
     cells = {
         "id": f'<a href="{PAGES[int(row["chapter"])]}.html#verdicts">{name}</a>',
