@@ -33,7 +33,8 @@
 # A run is a pure function of environment, configuration, number of episodes and seed. From one `numpy.random.SeedSequence(seed)` independent
 # streams are spawned. REINFORCE and DQN have four: for the environment, for the actions, for the network (initial weights, order of the samples) and for
 # the replay memory. Q-learning has six: start states, transitions and decisions, each for learning and for evaluation. An evaluation of chapter 6
-# has two more, for starts and for actions, which no training has touched. No global random state is read or changed. The same seed gives the same bits alone or among others, on one worker or
+# has two more, for starts and for actions, which no training has touched. The SARSA of chapter 2, which is not in the package, has one generator a seed; each bootstrap has a
+# fixed seed of its own. No global random state is read or changed. The same seed gives the same bits alone or among others, on one worker or
 # several, in one go or after having been killed; tests hold this to the bit. This copy of the book stands on the seeds 0 to {glue:text}`last-seed`. Whatever had to be chosen, such as
 # caps and budgets, was chosen on seeds from 1000 on. What was changed with data known is judged on seeds from 100 on, which nobody had seen.
 #
