@@ -17,9 +17,10 @@ def found(*intervals):
 
 
 def test_chance_is_counted_over_all_criteria():
-    counted = found((0.7, 0.55, 0.9), (0.7, 0.51, 0.9), (0.4, 0.3, 0.49), (0.3, 0.1, 0.4))
-    assert (counted.criteria, counted.random, counted.failed) == (4, 4, 2)
-    assert counted.by_chance == 4 / 20
+    missed = (0.4, 0.3, 0.49), (0.3, 0.1, 0.4)
+    counted = found((0.7, 0.55, 0.9), (0.7, 0.51, 0.9), *missed, (0.9, 0.8, 0.95))
+    assert (counted.criteria, counted.random, counted.failed) == (5, 5, 2)
+    assert counted.by_chance == 5 / 20
     assert counted.near["criterion"].tolist() == ["9a, criterion 2: fast", "9a, criterion 3: fast"]
     assert counted.near["measured"].tolist() == ["0.7 [0.51, 0.9]", "0.4 [0.3, 0.49]"]
     assert counted.near["met"].tolist() == ["yes", "no"]
