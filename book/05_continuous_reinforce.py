@@ -165,7 +165,7 @@ glue("parted", parted, display=False)
 for engine, taken in seconds.items():
     glue(f"seconds {engine}", f"{taken:.1f}", display=False)
 premise("the two part", parted > 1)
-offer("figure_s5_7", same_seed.table[["arm", "seed", "episode", "steps"]])
+offer("figure_s5_7", pd.concat(same_seed.values())[["arm", "seed", "episode", "steps"]])
 drawings.engines(same_seed)
 
 # %% [markdown]
