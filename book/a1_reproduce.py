@@ -137,7 +137,7 @@ premise(
 )
 captioned(
     held,
-    "Table A.6. How many of the 95% intervals hold the truth. Steps are lognormal, a seed that fails "
+    "Table A.5. How many of the 95% intervals hold the truth. Steps are lognormal, a seed that fails "
     "needs for ever; shares are computed without chance.",
     formats={"held (%)": "{:.1f}"},
 )
@@ -165,7 +165,7 @@ glue("about", len(verdicts), display=False)
 glue("moved", ", ".join(verdicts.index[verdicts > 1]) or "none", display=False)
 captioned(
     about,
-    "Table A.5. Claims of about so many steps: half the width of the window, as a share of the "
+    "Table A.6. Claims of about so many steps: half the width of the window, as a share of the "
     "steps; the share of all seeds inside; the verdict.",
     formats={"window": "{:.0%}", "low": "{:.0f}", "high": "{:.0f}", "share": "{:.0%}"},
 )

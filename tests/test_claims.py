@@ -320,6 +320,8 @@ def test_no_end_is_not_near_and_what_readings_share_is_one_criterion():
     same, other = Evidence.exact(1), Evidence.exact(2)
     assert len(criteria([shared.judge(same, readings=[[same]])])) == 1
     assert len(criteria([shared.judge(same, readings=[[other]])])) == 2
+    spread = Evidence(1, 0, 3, seeds=30)
+    assert what_it_would_take([shared.judge(spread, readings=[[spread]])]).count("criterion") == 1
 
 
 ABOUT = claim(Criterion("75 to 125", 75, 125), Criterion("the same of some", 75, 125), name="3a")

@@ -426,6 +426,16 @@ def judged(findings: Sequence[Finding]) -> Iterator[Judged]:
                 yield Judged(one.claim.id, one.claim.reading, place, *part)
 
 
+def _distinct(findings: Sequence[Finding]) -> Iterator[Judged]:
+    """The same, but once where two readings share a criterion and its evidence."""
+    seen = set()
+    for one in judged(findings):
+        key = (one.id, one.criterion, one.evidence)
+        if key not in seen:
+            seen.add(key)
+            yield one
+
+
 def what_it_would_take(findings: Sequence[Finding]) -> str:
     """Say which criteria are open, how many seeds would settle each, and what is excluded.
 
@@ -438,7 +448,7 @@ def what_it_would_take(findings: Sequence[Finding]) -> str:
     'none is open'
     """
     parts = []
-    for one in judged(findings):
+    for one in _distinct(findings):
         if one.answer == "open":
             seeds = seeds_to_tell(one.criterion, one.evidence)
             text = f"{seeds:,}" if math.isfinite(seeds) else "no number"
@@ -510,14 +520,12 @@ def criteria(findings: Sequence[Finding]) -> pd.DataFrame:
     >>> rows[["label", "answer", "near"]].values.tolist()
     [['9b, criterion 1', 'yes', True]]
     """
-    rows, seen = [], set()
-    for one in judged(findings):
-        if (one.id, one.criterion, one.evidence) not in seen:
-            seen.add((one.id, one.criterion, one.evidence))
-            numbers = {"label": one.label, "criterion": one.criterion.text, **asdict(one.evidence)}
-            bound = one.criterion.margin(one.evidence.estimate)[1]
-            near = _is_near(one.criterion, one.evidence)
-            rows.append({**numbers, "bound": bound, "answer": one.answer, "near": near})
+    rows = []
+    for one in _distinct(findings):
+        numbers = {"label": one.label, "criterion": one.criterion.text, **asdict(one.evidence)}
+        bound = one.criterion.margin(one.evidence.estimate)[1]
+        near = _is_near(one.criterion, one.evidence)
+        rows.append({**numbers, "bound": bound, "answer": one.answer, "near": near})
     names = ("label", "criterion", "estimate", "low", "high", "seeds", "bound", "answer", "near")
     return pd.DataFrame(rows, columns=list(names))
 
