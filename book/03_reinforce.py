@@ -178,7 +178,7 @@ offer("figure_s3_3", few.table[["seed", "episode", "steps"]])
 # Both engines begin with the same weights and draw the same random numbers.
 
 # %% tags=["hide-input"] mystnb={"image": {"alt": "Steps an episode of one seed, compiled and in torch: the same curve first, then two that part."}}
-middle = study.shown_places(curves, "Acrobot, as reported")["middle"]
+middle = study.shown_seeds(curves, "Acrobot, as reported")["middle"]
 engines = study.same_seed(RESULTS / "store", int(study.SEEDS[middle]))
 seconds = engines.provenance.set_index("arm")["processor_seconds"]
 parted = study.parting(engines)
@@ -422,7 +422,7 @@ def film(name, env_id):
     arm = f"{name}, as reported"
     config = next(a.config for a in study.arms() if a.name == arm)
     arrays = results.arrays(arm)
-    places = study.shown_places(curves, arm)
+    places = study.shown_seeds(curves, arm)
     episodes = {}
     for text, place in places.items():
         agent = as_learned(config, weights_of(arrays, place))

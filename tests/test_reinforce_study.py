@@ -122,11 +122,11 @@ def ending(*steps):
 
 
 def test_seeds_to_show_are_chosen_by_rule():
-    shown = study.shown_places(ending(300, np.inf, 100, 200, np.inf), "")
+    shown = study.shown_seeds(ending(300, np.inf, 100, 200, np.inf), "")
     assert shown == {"best": 2, "middle": 0, "worst that learned": 0, "failed": 1}
-    assert study.shown_places(ending(9, 5), "") == {
+    assert study.shown_seeds(ending(9, 5), "") == {
         "best": 1,
         "middle": 1,
         "worst that learned": 0,
     }
-    assert study.shown_places(ending(np.inf, np.inf), "")["failed"] == 0
+    assert study.shown_seeds(ending(np.inf, np.inf), "")["failed"] == 0

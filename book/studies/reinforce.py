@@ -380,7 +380,7 @@ def seconds(results: Results) -> pd.DataFrame:
     return shared.seconds(results, arms)
 
 
-def shown_places(curves: Curves, arm: str) -> dict[str, int]:
+def shown_seeds(curves: Curves, arm: str) -> dict[str, int]:
     """Places of the seeds to show, by a rule: best, middle and worst at the end, first to fail.
 
     The middle is that of all seeds, the worst that of those that learned.
