@@ -34,7 +34,8 @@ from drawings import look
 from drawings import maze as maze_drawings
 from drawings import planning as drawings
 from report.captions import captioned
-from report.claims import details, multiplicity, record, verdicts
+from report.chance import chance
+from report.claims import criteria, details, record, verdicts
 from report.figure_data import offer
 from report.listings import listing
 from report.seeds import premise
@@ -437,7 +438,7 @@ findings = study.findings(course, sample)
 record(findings, RESULTS, chapter="1")
 verdict = {finding.claim.id: finding.verdict for finding in findings}
 premise("Claim 1c depends on the reading.", verdict["1c"] == "depends on the reading")
-many = multiplicity(findings)
+many = chance(criteria(findings))
 glue("criteria", many.criteria, display=False)
 glue("criteria_random", many.random, display=False)
 glue("by_chance", many.by_chance, display=False)

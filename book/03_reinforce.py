@@ -89,7 +89,7 @@ premise("what is seen is the whole state", furthest < 1e-6)
 #
 # In an episode of three steps, each with reward $-1$, and with $\gamma = 0.99$, that is
 # $v_2 = -1$, $v_1 = -1 - 0.99 = -1.99$ and $v_0 = -1 - 0.99 \cdot 1.99 = -2.97$.
-# Actions followed by much reward become more likely, the others less. That is REINFORCE. In code it is a loss, whose descent is this climb:
+# Actions followed by much reward become more likely, the others less. That is REINFORCE; the report takes it from D. Silver's course (see the [references](references.md)). In code it is a loss, whose descent is this climb:
 
 # %% tags=["hide-input"]
 listing("rl_core.reinforce:TorchLearner.loss", "The loss.")
@@ -340,33 +340,32 @@ drawings.profiles(curves, names)
 #
 # The report says that on MountainCar one hidden layer does as well as two. It does not say how wide the layer was. So there are two
 # readings: a layer as narrow as the first of the two, with 10 units, and one as wide as one likes. For the second we take 128 units.
-# A layer of 30 stands between the two. On Acrobot the widest alone was run: that is where a single layer would be strongest. All seeds here are fresh, the criteria
-# were fixed before.
+# Layers of 20, 30 and 64 units stand between the two. All seeds here are fresh, the criteria were fixed before. On Acrobot no wider layer than that of 10 units was run: one more width
+# would cost as much as two of MountainCar's, and the claim about Acrobot is far from decided (the end of the chapter says how far).
 
 # %% tags=["hide-input"]
-wide = {10: "one layer of 10", 30: "one layer of 30", 128: "one layer of 128", "two": "as reported"}
+wide = {units: f"one layer of {units}" for units in study.UNITS} | {"two": "as reported"}
 steps = {
     units: float(np.median(fresh.at(f"MountainCar, {variant}", study.EPISODES)))
     for units, variant in wide.items()
 }
 for units, value in steps.items():
     glue(f"steps-{units}", value, display=False)
-glue("learned-128", int(fresh.learned("Acrobot, one layer of 128").sum()), display=False)
 premise("the narrow layer is slower than two", steps[10] > 1.1 * steps["two"])
 premise("the wide one is not", steps[128] <= 1.1 * steps["two"])
-premise("width decides", steps[10] > steps[30] > steps[128])
+premise("the wider, the fewer steps", steps[10] > steps[30] > steps[128])
 captioned(
     study.trial_table(fresh, near),
     f"Table 3.4. What was tried on fresh seeds, from {study.FRESH[0]} on. Steps: median [95% interval], "
     "∞ for a seed out of budget. Ran away: had an episode of more than "
-    f"{study.RUN_AWAY:,} steps. Raw returns and gamma 0.9 have a budget of {study.SHORT:,} "
+    f"{study.RUN_AWAY:,} steps. Raw returns have a budget of {study.SHORT:,} "
     f"environment steps, the others of {study.BUDGET:,}.",
 )
 
 # %% [markdown]
-# On MountainCar the median seed needs {glue:text}`steps-10:.0f` steps at the end with one layer of 10 units, {glue:text}`steps-30:.0f` with 30 and {glue:text}`steps-128:.0f` with 128.
-# With the report's two layers it is {glue:text}`steps-two:.0f`. So width decides, not the number of layers: the narrow layer is slower than two, the
-# wide one is not. On Acrobot {glue:text}`learned-128` of {glue:text}`seeds` seeds learn with one layer of 128 units.
+# At the end the median seed needs {glue:text}`steps-10:.0f` steps with one layer of 10 units, {glue:text}`steps-20:.0f` with 20, {glue:text}`steps-30:.0f` with 30,
+# {glue:text}`steps-64:.0f` with 64 and {glue:text}`steps-128:.0f` with 128. With the report's two layers it is {glue:text}`steps-two:.0f`. So the number of layers does not decide. The narrow layer is
+# slower than two, the wide one is not.
 #
 # ## Why raw returns fail
 #
@@ -382,7 +381,7 @@ captioned(
 # episode, whatever that did. An episode of $T = 10^5$ steps makes $T / 512 \approx 195$ batches an epoch. If this is the cause, one update an episode should mend it.
 
 # %% tags=["hide-input"]
-evidence = study.answers(fresh, near_a_bound.table)
+evidence = study.answers(fresh)
 met = [one.answer(found) for one, found in zip(study.QUESTIONS, evidence, strict=True)]
 for text, variant in (
     ("batches", "raw returns, one epoch"),
@@ -393,9 +392,6 @@ for text, variant in (
     glue(f"away-{text}", int(study.ran_away(fresh, arm).sum()), display=False)
     glue(f"learned-{text}", int(fresh.learned(arm).sum()), display=False)
 glue("epochs", evidence[3].estimate, display=False)
-for text, alpha in (("small", 0.0003), ("large", 0.003)):
-    count = int(fresh.learned(f"Acrobot, gamma 0.9, alpha {alpha}").sum())
-    glue(f"{text}-step", count, display=False)
 premise("stale updates ruin a seed", met[:2] == ["yes", "yes"])
 centred, once = (
     int(fresh.learned(f"MountainCar, {variant}").sum())
@@ -418,14 +414,14 @@ captioned(
 # **Epochs.** The report uses three epochs and says that it has not tested it. They pay: a seed with three gets to 500 steps sooner than one with a
 # single epoch with a probability of {glue:text}`epochs:.2f`.
 #
-# **Step size and discount.** A bad step size could pass for a bad discount. On Acrobot we gave $\gamma = 0.9$ two other step sizes, 0.0003 and 0.003, and a million
-# steps. {glue:text}`small-step` and {glue:text}`large-step` of {glue:text}`seeds` seeds learned.
+# **Step size and discount.** A bad step size could pass for a bad discount. Here one step size was run with each discount, so these arms cannot tell the two apart. On MountainCar
+# the formula above says that it is the discount. On Acrobot that is a guess. Chapter 4 tries other step sizes for DQN, which costs less.
 #
 # ## How long it took
 
 # %% tags=["hide-input"]
 captioned(
-    study.wall_clock(results, {"Acrobot": 2, "MountainCar": 3}),
+    study.seconds(results),
     "Table 3.6. Time for one run: in the report by the clock (its machine unknown), now of the processor.",
     formats={"2018 (s)": "{:.0f}", "now (s, mean)": "{:.1f}", "now, all seeds (s)": "{:.0f}"},
 )
@@ -439,7 +435,8 @@ captioned(
 
 # %%
 findings = study.findings(curves, fresh, near)
-record(findings, RESULTS, chapter="3")
+about = study.about(findings, curves, near)
+record(findings, RESULTS, chapter="3", about=about)
 captioned(verdicts(findings), "Table 3.7. The report's claims about REINFORCE.")
 
 # %% tags=["hide-input"]
@@ -450,8 +447,8 @@ captioned(
 
 # %% tags=["hide-input"]
 captioned(
-    study.windows(curves, near),
-    'Table 3.9. How wide is "about"? The share of seeds inside, and whether the median over all seeds is.',
+    about,
+    'Table 3.9. How wide is "about"? The share of seeds inside, and the verdict.',
     formats={"window": "{:.0%}", "low": "{:.0f}", "high": "{:.0f}", "share": "{:.0%}"},
 )
 

@@ -55,7 +55,7 @@ HTML(front_page.verdict_bar(claims))
 
 # %% [markdown]
 # The report makes {glue:text}`claims` statements that can be checked. Each got a criterion in code. Where one was not
-# fixed before its data was looked at, or its evidence was corrected afterwards, the chapter says so. {glue:text}`holds` hold, {glue:text}`holds-in-part` hold in part,
+# fixed before its data was looked at, or its evidence was corrected afterwards, it stands in the [table of amendments](a1_reproduce.ipynb). {glue:text}`holds` hold, {glue:text}`holds-in-part` hold in part,
 # {glue:text}`does-not-hold` do not hold, {glue:text}`depends-on-the-reading` depend on how the report is read, and of {glue:text}`cannot-tell` our runs cannot tell. What failed stands
 # first. Claims differ in kind: some are theorems, some are numbers that one lucky run produced.
 
@@ -67,7 +67,7 @@ HTML(front_page.claims_table(claims))
 # intervals, and holds in part if only some are. If none is met and at least one is missed by its whole interval, it does not hold. Otherwise every
 # interval reaches to both sides of a bound: what we measured fits a yes and a no, and the seeds are too few to tell. Where the report's words can fairly be read in two ways and the verdicts
 # differ, it depends on the reading. Shown is the quantity that decides: of the first criterion that failed, or else of the one that is
-# nearest to its bound.
+# nearest to its bound. "About so many steps" means within a quarter; where a narrower or a wider window makes another verdict, the row says which.
 #
 # ## The report's figures, then and now
 

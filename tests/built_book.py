@@ -83,8 +83,8 @@ FEWER = {  # whose first criterion is about fewer seeds than were run
 
 
 def test_full_results_stand_on_thirty_seeds(claims):
-    """Except what is exact, and where a criterion is about those seeds that learned."""
-    others = claims[~claims["seeds"].isin([0, 30])]
+    """At least; except what is exact, and where a criterion is about those seeds that learned."""
+    others = claims[claims["seeds"].between(1, 29)]
     assert set(others.index) <= set(FEWER)
     assert others["criterion"].str.contains("among seeds that learned").all()
     exact = claims[claims["seeds"] == 0]

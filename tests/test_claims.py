@@ -17,8 +17,8 @@ from report.claims import (
     Criterion,
     Evidence,
     Reading,
+    criteria,
     details,
-    multiplicity,
     number,
     record,
     seeds_to_tell,
@@ -300,34 +300,59 @@ def test_every_reading_needs_its_name_and_its_evidence():
 # --- many criteria, and what "about" means ------------------------------------------------------
 
 
-def test_how_many_criteria_there_are_and_which_are_near_their_bound():
+def test_every_criterion_has_its_row_and_says_whether_it_is_near_its_bound():
     near = claim(FEW, MANY, name="3a").judge(
         Evidence(8, 7, 9.8, seeds=30),  # 0.2 from 10, width 2.8: near
         Evidence(5, 4, 6, seeds=30),
     )
     exact = IN_ROUNDS.judge(Evidence.exact(1), readings=[[Evidence(1.5, 1.1, 3.1, seeds=9)]])
     missed = claim(FEW, name="3b").judge(Evidence(14, 10.5, 13.5 + 2, seeds=30))  # a tenth: near
-    found = multiplicity([near, exact, missed])
-    assert found[:3] == (5, 4, 0.2)
-    assert found.near == (
-        *("3a, criterion 1", "1c (iteration as sweep), criterion 1", "3b, criterion 1"),
-    )
+    found = criteria([near, exact, missed])
+    assert found["near"].tolist() == [True, False, False, True, True]
+    assert found["answer"].tolist() == ["yes", "yes", "yes", "no", "no"]
+    assert found["label"].iloc[3] == "1c (iteration as sweep), criterion 1"
+    assert found["bound"].tolist() == [10, 1, 1, 1, 10]
 
 
-def test_no_end_is_not_near():
-    assert multiplicity([claim(FEW).judge(Evidence.none())]).near == ()
+def test_no_end_is_not_near_and_what_readings_share_is_one_criterion():
+    assert not criteria([claim(FEW).judge(Evidence.none())])["near"].any()
+    shared = replace(IN_ROUNDS, readings=(Reading("iteration as sweep", IN_ROUNDS.criteria),))
+    same, other = Evidence.exact(1), Evidence.exact(2)
+    assert len(criteria([shared.judge(same, readings=[[same]])])) == 1
+    assert len(criteria([shared.judge(same, readings=[[other]])])) == 2
+    spread = Evidence(1, 0, 3, seeds=30)
+    assert what_it_would_take([shared.judge(spread, readings=[[spread]])]).count("criterion") == 1
+
+
+ABOUT = claim(Criterion("75 to 125", 75, 125), Criterion("the same of some", 75, 125), name="3a")
 
 
 def test_what_about_means():
-    table = sensitivity(100, [80, 85, 115, 125, math.inf], Evidence(115, 80, 120, seeds=5))
+    finding = ABOUT.judge(Evidence(115, 80, 120, seeds=5), Evidence(115, 114, 116, seeds=4))
+    table = sensitivity(finding, 100, [80, 85, 115, 125, math.inf])
     assert table["share"].tolist() == [0.4, 0.8, 0.8]
-    assert table["answer"].tolist() == ["open", "yes", "yes"]
+    assert table["verdict"].tolist() == ["cannot tell", "holds", "holds"]
+    assert table["claim"].tolist() == ["3a"] * 3
     assert table[["low", "high"]].to_numpy().tolist() == [[85, 115], [75, 125], [65, 135]]
-    assert sensitivity(-100, [-90], Evidence.exact(-90))["share"].tolist() == [1, 1, 1]
+    assert table["verdict"].iloc[1] == finding.verdict
+    assert sensitivity(finding, -100, [-90])["share"].tolist() == [1, 1, 1]
     with pytest.raises(ValueError, match="values must be without NaN"):
-        sensitivity(100, [math.nan], Evidence.exact(1))
+        sensitivity(finding, 100, [math.nan])
     with pytest.raises(ValueError, match="about must be"):
-        sensitivity(math.nan, [1], Evidence.exact(1))
+        sensitivity(finding, math.nan, [1])
+
+
+def test_the_table_says_what_becomes_of_a_verdict_where_about_means_more(tmp_path):
+    finding = ABOUT.judge(Evidence(115, 80, 120, seeds=5), Evidence(115, 114, 116, seeds=4))
+    other = claim(FEW, name="3b").judge(Evidence.exact(7))
+    record([finding, other], tmp_path, chapter="3", about=sensitivity(finding, 100, [80, 85]))
+    record([claim(FEW, name="4a").judge(Evidence.exact(7))], tmp_path, chapter="4")
+    table = pd.read_csv(tmp_path / "claims.csv", keep_default_na=False)
+    assert table["about"].tolist() == ["15%: cannot tell; 25%: holds; 35%: holds", "", ""]
+    assert len(pd.read_csv(tmp_path / "about.csv")) == 3
+    assert pd.read_csv(tmp_path / "criteria.csv")["label"].tolist() == [
+        *("3a, criterion 1", "3a, criterion 2", "3b, criterion 1", "4a, criterion 1"),
+    ]
 
 
 @pytest.mark.parametrize("name", ["../evil", "a/b", "", ".", "..", "/tmp/evil", "a\\b", "1\n"])

@@ -84,7 +84,7 @@ def arm_rows(arm):
 def test_claims_are_judged_by_the_arms_they_name(monkeypatch):
     monkeypatch.setattr(study, "SEEDS", range(12))
     curves = study.Curves(pd.concat([arm_rows(arm.name) for arm in study.arms()]))
-    found = {finding.claim.id: finding for finding in study.findings(curves)}
+    found = {finding.claim.id: finding for finding in study.findings(curves, curves)}
     estimates = {name: [e.estimate for e in finding.evidence] for name, finding in found.items()}
     assert estimates == {
         "3f": [80, 80],
@@ -215,7 +215,8 @@ def test_seeds_are_counted_by_thresholds_and_windows(monkeypatch):
     curves = study.Curves(pd.concat([arm_rows(arm.name) for arm in study.arms()]))
     assert study.within(curves, "Acrobot, as reported", 60, 100) == [10, 10, 10]
     assert study.goals(curves, "MountainCar, original") == (12, 12 * (45_000 // 240))
-    shares = study.about(curves).groupby("claim")["share"].apply(list).to_dict()
+    about = study.about(study.findings(curves, curves), curves)
+    shares = about.groupby("claim")["share"].apply(list).to_dict()
     assert shares == {"3f": [10 / 12] * 3, "3g": [0.0] * 3}
     table = study.mended_alone_or_not(curves).set_index("cause")
     assert table.loc["all four", "Acrobot: it alone"] == "12 of 12"

@@ -31,6 +31,7 @@ FOUND = pd.DataFrame(
         "distance": [-74.5, 0.0, 0.0],
         "readings": [np.nan] * 3,  # as an empty text is read from a file
         "amended": ["on seeds 100 to 129", np.nan, np.nan],
+        "about": ["15%: does not hold; 25%: does not hold; 35%: does not hold", np.nan, np.nan],
         "chapter": [3, 1, 2],
     }
 )
@@ -98,11 +99,20 @@ def test_both_numbers_are_shown_where_the_verdict_depends_on_the_reading():
     assert "<b>1</b> depends on the reading" in front_page.verdict_bar(row)
 
 
+def test_a_verdict_that_hangs_on_the_meaning_of_about_is_marked():
+    words = "15%: does not hold; 25%: cannot tell; 35%: holds"
+    page = front_page.claims_table(FOUND.assign(about=[words, np.nan, np.nan]))
+    assert page.count(f'<div class="readings">“About” within {words}</div>') == 1
+    page = front_page.claims_table(FOUND)  # where all three agree it stands behind the click only
+    assert page.count("<p>“About” within: 15%: does not hold;") == 1
+    assert '<div class="readings">' not in page
+
+
 def test_what_a_table_says_is_text():
     assert "c &lt;third&gt;" in front_page.claims_table(FOUND)
     hostile = '"><script>alert(1)</script>'
     texts = ["id", "section", "claim", "criterion", "verdict", "deciding_criterion", "readings"]
-    table = FOUND.assign(**dict.fromkeys([*texts, "amended"], hostile))
+    table = FOUND.assign(**dict.fromkeys([*texts, "amended", "about"], hostile))
     table["figure"] = f"Figure 11, {hostile}"
     for page in (front_page.claims_table(table), front_page.verdict_bar(table)):
         assert "<script" not in page

@@ -25,7 +25,8 @@ CONSTANTS = {  # numbers of the worlds and of the sources, which no run changes
     "05_continuous_reinforce": {0.07, 90, 10_000, 30},  # top speed, return that counts as solved,
     # an episode's length in an example, the number of seeds in the question
     "intro": {650},  # the report's course
-    "a1_reproduce": {3.11, 256, 1.5, 512, 32, 1_000},  # versions, SHA-256, sizes of 2018's batches
+    # versions, SHA-256, sizes of the batches of 2018
+    "a1_reproduce": {3.11, 3.12, 3.13, 256, 1.5, 512, 32, 1_000},
 }
 EVERYWHERE = {2018, 95, 29}  # the year of the report, the intervals, the last seed
 NUMBER = re.compile(r"(?<![\w.])\d+(?:,\d{3})*(?:\.\d+)?(?![\w]|\.\d)")

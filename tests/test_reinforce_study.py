@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
-import pytest
 
 from studies import reinforce as study
 
@@ -80,22 +79,15 @@ def test_no_seed_is_left_out_and_fresh_claims_see_fresh_seeds():
 
 
 def test_the_questions_are_answered_by_what_the_arms_did():
-    """One arm runs away at once; reported seeds that used a million steps up count as failed."""
+    """One arm runs away at once, one never gets to 500 steps."""
 
     def fresh(arm, seed):
-        return {
-            "MountainCar, raw returns, one epoch": 600_000,
-            "Acrobot, gamma 0.9, alpha 0.003": 900,
-        }.get(arm, 100)
+        steps = {"raw returns, one epoch": 600_000, "one epoch": 900}
+        return steps.get(arm.removeprefix("MountainCar, "), 100)
 
-    curves = study.Curves(fresh_table(fresh), study.FRESH)
-    few, many = (
-        [piece.estimate for piece in study.answers(curves, near_table(lambda arm, seed, n=n: n))]
-        for n in (99, 999)
-    )
-    assert few == [1, 0, 0, 0.5, 1, 1]
-    assert many == [1, 0, 0, 0.5, 0, 0]
-    assert len(study.QUESTIONS) == len(few)
+    found = study.answers(study.Curves(fresh_table(fresh), study.FRESH))
+    assert [piece.estimate for piece in found] == [1, 0, 0, 1]
+    assert len(study.QUESTIONS) == len(found)
 
 
 def test_seeds_are_compared_with_themselves():
@@ -105,11 +97,6 @@ def test_seeds_are_compared_with_themselves():
     assert column["Acrobot, as reported"] == ""
     assert column["Acrobot, gamma 0.9"] == "20 [20, 20]"
     assert column["MountainCar, raw returns"] == "0 [0, 0]"
-
-
-@pytest.mark.parametrize(("interval", "text"), [((-3.0, -np.inf, 4.0), "−3 [−∞, 4]")])
-def test_intervals_have_signs(interval, text):
-    assert study._interval(interval) == text
 
 
 def test_what_is_seen_of_the_cars_is_all_there_is():

@@ -28,16 +28,15 @@ def test_a_comparison_has_the_seeds_of_the_smaller_group():
 @pytest.mark.parametrize(
     ("steps", "place"), [([9, 5, 7], 2), ([9, 5, 7, np.inf], 2), ([1, 1, 1], 1), ([np.inf], 0)]
 )
-def test_the_seed_in_the_middle(monkeypatch, steps, place):
-    """It is a seed, not its place: where seeds begin at 100 it is one of these."""
-    monkeypatch.setattr(shared, "SEEDS", range(100, 130))
-    assert shared.middle_seed(np.array(steps)) == 100 + place
+def test_the_place_in_the_middle(steps, place):
+    assert shared.middle(np.array(steps)) == place
 
 
-def test_the_clock_counts_the_named_arms():
-    made = pd.DataFrame({"arm": ["a", "a", "b"], "seconds": [1.0, 3.0, 9.0], "processor": "p"})
+def test_the_processor_s_time_counts_of_the_named_arms():
+    made = pd.DataFrame({"arm": ["a", "a", "b"], "processor": "p", "seconds": 99.0})
+    made["processor_seconds"] = [1.0, 3.0, 9.0]
     results = type("Results", (), {"provenance": made})
-    table = shared.wall_clock(results, {"a": ("one seed of a", 60.0)}, "all (s)")
+    table = shared.seconds(results, {"a": ("one seed of a", 60.0)})
     assert table.to_numpy().tolist() == [["one seed of a", 60.0, 2.0, 4.0, "p"]]
 
 

@@ -154,10 +154,10 @@ def _every_seed(axes: Axes, curves: Curves, arm: str) -> None:
     """A line a seed with a cross where its budget was used up, and the median of the good ones."""
     x = np.arange(EVERY, EPISODES + 1, EVERY)
     good, smooth = curves.learned(arm), curves.smooth[arm]
-    for steps, learned, end in zip(smooth, good, curves.ends[arm], strict=True):
+    for steps, learned in zip(smooth, good, strict=True):
         style = {"color": GREY, "ls": "-"} if learned else {"color": BLACK, "ls": ":"}
-        axes.plot(x[x <= end], steps[x[x <= end] - 1], lw=0.6, **style)
-        last = np.flatnonzero(np.isfinite(steps[:end]))[-1]
+        axes.plot(x, steps[x - 1], lw=0.6, **style)
+        last = np.flatnonzero(np.isfinite(steps))[-1]
         if last + 1 < EPISODES:
             axes.plot(last + 1, steps[last], "x", color=VERMILLION, ms=6, clip_on=False)
     axes.plot([], [], color=GREY, ls="-", lw=0.8, label=f"{good.sum()} seeds that learned")

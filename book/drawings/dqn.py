@@ -6,16 +6,25 @@ import numpy as np
 import pandas as pd
 from interactive import Widget, seed_curves
 from matplotlib import pyplot as plt
-from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from drawings.look import BLACK, BLUE, COLOURS, GREY, LINES, ORANGE, SKY_BLUE, VERMILLION, label
+from drawings.look import (
+    BLACK,
+    BLUE,
+    COLOURS,
+    GREY,
+    LINES,
+    ORANGE,
+    SKY_BLUE,
+    VERMILLION,
+    label,
+    median_band,
+)
 from drawings.reinforce import films
 from rl_core.evaluation import Rollout, Weights, action_values, of_values
 from rl_core.experiments import Results
-from rl_core.statistics import bootstrap_interval
 from rl_core.training import weights_of
 from studies import dqn as study
 from studies.dqn import BUDGET, ENV, EPISODES, LEARNED, PARTS, Curves
@@ -47,7 +56,7 @@ def learning_curve(curves: Curves, name: str, original: pd.DataFrame) -> Figure:
         text = f"stopped before the goal ({len(stopped)} episodes)"
         axes.plot(stopped["episode"], stopped["steps"], "x", color=BLACK, ms=5, label=text)
     text = f"median of all {len(seeds)} seeds, 95% interval"
-    _median(axes, x, seeds, BLUE, "-", text, top=np.nanmax(seeds))
+    median_band(axes, x, seeds, colour=BLUE, line="-", text=text)
     axes.set_yscale("log")
     label(axes, x="episode", y="steps to the goal (log scale)")
     figure.legend(loc="outside lower center", ncols=2, fontsize=9)
@@ -110,7 +119,8 @@ def over_the_budget(curves: Curves, names: dict[str, str]) -> Figure:
         for i, (variant, text) in enumerate(names.items()):
             steps = curves.parts(f"{name}, {variant}")
             shown = text if name == "Acrobot" else None
-            _median(axes, middles, steps, COLOURS[i], LINES[i], shown, top=tenth, marker="o")
+            style = {"colour": COLOURS[i], "line": LINES[i], "marker": "o"}
+            median_band(axes, middles, steps, text=shown, top=tenth, **style)
         axes.set_yscale("log")
         axes.set_xlim(0, BUDGET[name] / 1000)
         label(axes, x="environment steps (thousands)", y="steps a goal (log scale)", title=name)
@@ -177,33 +187,6 @@ def over_the_reported(curves: Curves, arm: str, others: Mapping[str, np.ndarray]
     figure.legend(loc="outside lower center", ncols=2, fontsize=9)
     plt.close(figure)
     return figure
-
-
-def _median(
-    axes: Axes,
-    x: np.ndarray,
-    seeds: np.ndarray,
-    colour: str,
-    line: object,
-    text: str | None,
-    top: float,
-    marker: str = "",
-) -> None:
-    """Median over seeds; a seed that stopped, or reached no goal, counts as needing for ever."""
-    values = np.where(np.isnan(seeds), np.inf, seeds)
-    rng = np.random.default_rng(np.random.SeedSequence(2020))
-    middle, low, high = bootstrap_interval(values, rng=rng, resamples=2_000)
-    axes.fill_between(
-        x,
-        low,
-        np.where(np.isinf(high), top, high),
-        where=np.isfinite(low),
-        color=colour,
-        alpha=0.22,
-        lw=0,
-    )
-    drawn = np.where(np.isinf(middle), np.nan, middle)
-    axes.plot(x, drawn, color=colour, ls=line, marker=marker, ms=4, label=text)
 
 
 def plane_table(policies: dict[str, tuple[Weights, Rollout]]) -> pd.DataFrame:

@@ -10,10 +10,9 @@ from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 from PIL import Image
 
-from drawings.look import BLACK, BLUE, COLOURS, GREY, LINES, Film, label
+from drawings.look import BLACK, BLUE, COLOURS, GREY, LINES, Film, label, median_band
 from rl_core.evaluation import Agent, Rollout, as_learned, rollout
 from rl_core.experiments import Results
-from rl_core.statistics import bootstrap_interval
 from rl_core.training import weights_of
 from studies import reinforce as study
 from studies.reinforce import DRAWN, EPISODES, Curves
@@ -45,7 +44,8 @@ def learning_curve(curves: Curves, arm: str, original: pd.DataFrame) -> Figure:
     if not learned.all():
         text = f"{(~learned).sum()} that did not (× out of budget)"
         axes.plot([], [], color=BLACK, ls=":", lw=0.8, label=text)
-    _median(axes, x, seeds, BLUE, "-", f"median of all {len(seeds)} seeds, 95% interval")
+    text = f"median of all {len(seeds)} seeds, 95% interval"
+    median_band(axes, x, seeds, colour=BLUE, line="-", text=text)
     axes.set_yscale("log")
     label(axes, x="episode", y="steps to the goal (log scale)")
     axes.legend(fontsize=9)
@@ -77,7 +77,8 @@ def variants(curves: Curves, name: str, names: Mapping[str, str]) -> Figure:
         arm = f"{name}, {variant}"
         learned = curves.learned(arm)
         share = f"{text} ({learned.sum()} of {len(learned)} learned)"
-        _median(axes, DRAWN, curves.smooth[arm][:, DRAWN - 1], COLOURS[i], LINES[i], share)
+        steps = curves.smooth[arm][:, DRAWN - 1]
+        median_band(axes, DRAWN, steps, colour=COLOURS[i], line=LINES[i], text=share)
     axes.axhline(LIMIT[name], color=GREY, lw=0.8, ls="-")
     note = f"Gymnasium's time limit, {LIMIT[name]}"
     axes.text(0, LIMIT[name], note, ha="left", va="bottom", fontsize=8)
@@ -86,24 +87,6 @@ def variants(curves: Curves, name: str, names: Mapping[str, str]) -> Figure:
     figure.legend(loc="outside lower center", ncols=2, fontsize=9)
     plt.close(figure)
     return figure
-
-
-def _median(axes, x, seeds, colour, line, text) -> None:
-    """Median over seeds; a seed that stopped counts as needing for ever."""
-    values = np.where(np.isnan(seeds), np.inf, seeds)
-    rng = np.random.default_rng(np.random.SeedSequence(2020))
-    middle, low, high = bootstrap_interval(values, rng=rng, resamples=2_000)
-    top = np.nanmax(seeds)
-    axes.fill_between(
-        x,
-        low,
-        np.where(np.isinf(high), top, high),
-        where=np.isfinite(low),
-        color=colour,
-        alpha=0.22,
-        lw=0,
-    )
-    axes.plot(x, np.where(np.isinf(middle), np.nan, middle), color=colour, ls=line, label=text)
 
 
 def profiles(curves: Curves, variants: Mapping[str, str]) -> Figure:

@@ -217,6 +217,58 @@ AMENDMENTS = [
         "see chapter 6",
         "seeds 100 to 129; REINFORCE 100 to 104",
     ),
+    Amendment(
+        "second edition",
+        "4a to 4f",
+        "seeds that the budget ended while they still got out count as not having learned, as they "
+        "did at first, and as in chapter 3",
+        True,
+        "shares that learn; no verdict",
+        "seeds 0 to 29",
+    ),
+    Amendment(
+        "second edition",
+        "3i, 3k",
+        "Acrobot's criteria, near their bound, judged on further seeds alone, once",
+        True,
+        "see chapter 4",
+        "seeds 100 to 249",
+    ),
+    Amendment(
+        "second edition",
+        "3n",
+        "the shares of seeds that learn, near their bound, judged on further seeds alone, once; a "
+        "second reading, Acrobot by its angles and speeds",
+        True,
+        "two criteria, from open to met",
+        "seeds 100 to 199; the second reading first 100 to 129",
+    ),
+    Amendment(
+        "second edition",
+        "3n",
+        "the second reading's criterion on Acrobot, open on seeds 100 to 129, judged on further "
+        "seeds alone, once",
+        True,
+        "see chapter 6",
+        "seeds 130 to 199",
+    ),
+    Amendment(
+        "second edition",
+        "sentences of chapter 4",
+        "two criteria: whether another step size does for the discount of 0.99 what 0.9 does",
+        True,
+        "see chapter 4",
+        "seeds 100 to 129",
+    ),
+    Amendment(
+        "second edition",
+        "sentences of chapter 3",
+        "layers of 20 and 64 units added, without a criterion; left out, for what they cost, a "
+        "layer of 128 units on Acrobot and two step sizes with gamma 0.9",
+        True,
+        "no criterion of a claim",
+        "seeds 100 to 129",
+    ),
 ]
 """In the order in which they were made."""
 

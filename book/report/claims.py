@@ -9,7 +9,7 @@ reading has its criteria, and a verdict that they do not share depends on the re
 import math
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from numbers import Real
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -30,7 +30,7 @@ COLUMNS = (
     *("id", "section", "claim", "criterion", "estimate", "low", "high"),
     *("seeds", "verdict", "figure"),
     *("deciding_criterion", "deciding_estimate", "deciding_low", "deciding_high"),
-    *("deciding_seeds", "deciding_bound", "distance", "readings", "amended", "chapter"),
+    *("deciding_seeds", "deciding_bound", "distance", "readings", "amended", "about", "chapter"),
 )
 WINDOWS = (0.15, 0.25, 0.35)  # of what a report says is "about" so much
 POWER = 2.04
@@ -325,6 +325,7 @@ class Finding:
             "distance": distance,
             "readings": "; ".join(one._as_read() for one in every),
             "amended": self.claim.amended,
+            "about": "",
         }
 
     def _as_read(self) -> str:
@@ -425,6 +426,16 @@ def judged(findings: Sequence[Finding]) -> Iterator[Judged]:
                 yield Judged(one.claim.id, one.claim.reading, place, *part)
 
 
+def _distinct(findings: Sequence[Finding]) -> Iterator[Judged]:
+    """The same, but once where two readings share a criterion and its evidence."""
+    seen = set()
+    for one in judged(findings):
+        key = (one.id, one.criterion, one.evidence)
+        if key not in seen:
+            seen.add(key)
+            yield one
+
+
 def what_it_would_take(findings: Sequence[Finding]) -> str:
     """Say which criteria are open, how many seeds would settle each, and what is excluded.
 
@@ -437,7 +448,7 @@ def what_it_would_take(findings: Sequence[Finding]) -> str:
     'none is open'
     """
     parts = []
-    for one in judged(findings):
+    for one in _distinct(findings):
         if one.answer == "open":
             seeds = seeds_to_tell(one.criterion, one.evidence)
             text = f"{seeds:,}" if math.isfinite(seeds) else "no number"
@@ -446,25 +457,25 @@ def what_it_would_take(findings: Sequence[Finding]) -> str:
 
 
 def sensitivity(
-    about: float, values: ArrayLike, evidence: Evidence, *, windows: Sequence[float] = WINDOWS
+    finding: Finding, about: float, values: ArrayLike, *, windows: Sequence[float] = WINDOWS
 ) -> pd.DataFrame:
     """Say what becomes of a claim of "about" so much where "about" means more, or less.
 
     Parameters
     ----------
+    finding : Finding
+        Of a claim all of whose criteria have the bounds of one window.
     about : float
         What the report says.
     values : array, shape (seeds,)
         What each seed comes to; infinite where it does not get there.
-    evidence : Evidence
-        The quantity that is judged.
     windows : sequence of float
         Half the widths of what counts as "about", as shares of it.
 
     Returns
     -------
     pandas.DataFrame
-        A row a window: `window, low, high, share` of the seeds inside, `answer`.
+        A row a window: `claim, about, window, low, high, share` of the seeds inside, `verdict`.
 
     Raises
     ------
@@ -473,66 +484,57 @@ def sensitivity(
 
     Examples
     --------
-    >>> sensitivity(100, [90, 120, 130, 400], Evidence(125, 110, 132, seeds=4))
-       window   low   high  share answer
-    0    0.15  85.0  115.0   0.25   open
-    1    0.25  75.0  125.0   0.50   open
-    2    0.35  65.0  135.0   0.75    yes
+    >>> claim = Claim("9a", "9", "About 100.", (Criterion("75 to 125", 75, 125),), "Figure 9")
+    >>> finding = claim.judge(Evidence(125, 110, 132, seeds=4))
+    >>> sensitivity(finding, 100, [90, 120, 130, 400])[["window", "share", "verdict"]]
+       window  share      verdict
+    0    0.15   0.25  cannot tell
+    1    0.25   0.50  cannot tell
+    2    0.35   0.75        holds
     """
     about, values = checks.number("about", about), floats("values", values, (None,), finite=False)
     require(len(values), "values", values, "not empty")
-    rows = []
+    claim, rows = finding.claim, []
     for window in windows:
         half = checks.number("windows", window, above=0) * abs(about)
         low, high = about - half, about + half
+        criteria = tuple(Criterion(one.text, low, high) for one in claim.criteria)
+        judged = replace(claim, criteria=criteria, readings=()).judge(*finding.evidence)
         share = float(np.mean((low <= values) & (values <= high)))
-        answer = Criterion("about", low, high).answer(evidence)
-        rows.append((window, low, high, share, answer))
-    return pd.DataFrame(rows, columns=["window", "low", "high", "share", "answer"])
+        rows.append((claim.id, about, window, low, high, share, judged.verdict))
+    columns = ["claim", "about", "window", "low", "high", "share", "verdict"]
+    return pd.DataFrame(rows, columns=columns)
 
 
-class Multiplicity(NamedTuple):
-    """How many criteria there are, and what that many would come to by chance.
+def criteria(findings: Sequence[Finding]) -> pd.DataFrame:
+    """One row for each criterion of each reading: what was asked and measured, and the answer.
 
-    Attributes
-    ----------
-    criteria : int
-        All of them, in all readings.
-    random : int
-        Those whose evidence has an interval.
-    by_chance : float
-        How many 95% intervals can be expected to miss their quantity: a twentieth.
-    near : tuple of str
-        The criteria whose interval ends within a tenth of its width of a bound.
-    """
-
-    criteria: int
-    random: int
-    by_chance: float
-    near: tuple[str, ...]
-
-
-def multiplicity(findings: Sequence[Finding]) -> Multiplicity:
-    """Count criteria, those that could fail by chance, and name those that nearly did, or did not.
+    A criterion that two readings share, with the same evidence, has one row. `near` says whether
+    its interval ends within a tenth of its width of a bound.
 
     Examples
     --------
     >>> half = Criterion("above a half", above=0.5)
     >>> claim = Claim("9b", "9", "Better.", (half,), "Figure 9")
-    >>> multiplicity([claim.judge(Evidence(0.7, 0.51, 0.9, seeds=30))])
-    Multiplicity(criteria=1, random=1, by_chance=0.05, near=('9b, criterion 1',))
+    >>> rows = criteria([claim.judge(Evidence(0.7, 0.51, 0.9, seeds=30))])
+    >>> rows[["label", "answer", "near"]].values.tolist()
+    [['9b, criterion 1', 'yes', True]]
     """
-    every = list(judged(findings))
-    random = [one for one in every if one.evidence.low < one.evidence.high]
-    near = tuple(one.label for one in random if _is_near(one.criterion, one.evidence))
-    return Multiplicity(len(every), len(random), len(random) / 20, near)
+    rows = []
+    for one in _distinct(findings):
+        numbers = {"label": one.label, "criterion": one.criterion.text, **asdict(one.evidence)}
+        bound = one.criterion.margin(one.evidence.estimate)[1]
+        near = _is_near(one.criterion, one.evidence)
+        rows.append({**numbers, "bound": bound, "answer": one.answer, "near": near})
+    names = ("label", "criterion", "estimate", "low", "high", "seeds", "bound", "answer", "near")
+    return pd.DataFrame(rows, columns=list(names))
 
 
 def _is_near(criterion: Criterion, evidence: Evidence) -> bool:
     """Whether the interval ends within a tenth of its width of a bound."""
     ends = (evidence.low, evidence.high)
     distance = min(abs(end - bound) for end in ends for bound in criterion.bounds)
-    return distance <= _half(evidence) / 5 < math.inf
+    return 0 < _half(evidence) < math.inf and distance <= _half(evidence) / 5
 
 
 def verdicts(findings: Sequence[Finding]) -> pd.DataFrame:
@@ -561,18 +563,26 @@ def details(findings: Sequence[Finding]) -> pd.DataFrame:
     )
 
 
-def record(findings: Sequence[Finding], folder: Path, *, chapter: str) -> pd.DataFrame:
-    """Write a chapter's findings, and `claims.csv` anew from those of all chapters so far.
+def record(
+    findings: Sequence[Finding],
+    folder: Path,
+    *,
+    chapter: str,
+    about: pd.DataFrame | None = None,
+) -> pd.DataFrame:
+    """Write a chapter's findings, and anew the book's tables from all chapters so far.
 
     Parameters
     ----------
     findings : sequence of Finding
         The chapter's findings.
     folder : Path
-        Where the results are; `claims/<chapter>.csv` and `claims.csv` are written in it, each at
-        once or not at all.
+        Where the results are. `claims.csv`, `criteria.csv` and `about.csv` are written in it, from
+        a part a chapter in `claims/<chapter>.csv` and so on; each at once or not at all.
     chapter : str
         The chapter's name, which orders the parts: letters and digits, never a path.
+    about : pandas.DataFrame, optional
+        The rows of `sensitivity` for the chapter's claims of "about" so much.
 
     Returns
     -------
@@ -590,26 +600,39 @@ def record(findings: Sequence[Finding], folder: Path, *, chapter: str) -> pd.Dat
     >>> claim = Claim("9a", "9", "Few.", (Criterion("at most 2", at_most=2),), "Figure 9")
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     rows = record([claim.judge(Evidence.exact(1))], Path(folder), chapter="9")
-    ...     sorted(path.name for path in Path(folder).iterdir())
-    ['claims', 'claims.csv']
+    ...     sorted(path.name for path in Path(folder).glob("*.csv"))
+    ['claims.csv', 'criteria.csv']
     >>> rows["verdict"].tolist()
     ['holds']
     """
     chapter = file_name("chapter", chapter)
     rows = pd.DataFrame([finding.row() for finding in findings], columns=list(COLUMNS))
     rows["chapter"] = chapter
-    parts = folder / "claims"
-    parts.mkdir(parents=True, exist_ok=True)
-    others = [path for path in sorted(parts.glob("*.csv")) if path.stem != chapter]
-    text = dict.fromkeys(("id", "section", "chapter"), str)
-    known = {path.stem: pd.read_csv(path, dtype=text) for path in others}
-    known[chapter] = rows
-    everything = pd.concat([known[name] for name in sorted(known)], ignore_index=True)
+    if about is not None:
+        words = about["window"].map("{:.0%}: ".format) + about["verdict"]
+        rows["about"] = rows["id"].map(words.groupby(about["claim"]).agg("; ".join)).fillna("")
+        _gather(about, folder, "about", chapter)
+    everything = _with_others(rows, folder, "claims", chapter)
     twice = everything.loc[everything["id"].duplicated(), "id"].tolist()
     require(not twice, "findings", ", ".join(twice), "of claims that are judged only once")
-    _write_atomically(rows, parts / f"{chapter}.csv")
-    _write_atomically(everything, folder / "claims.csv")
+    _gather(rows, folder, "claims", chapter)
+    _gather(criteria(findings), folder, "criteria", chapter)
     return rows
+
+
+def _with_others(rows: pd.DataFrame, folder: Path, name: str, chapter: str) -> pd.DataFrame:
+    """A chapter's rows among those of the others, in their order."""
+    paths = [path for path in sorted((folder / name).glob("*.csv")) if path.stem != chapter]
+    text = dict.fromkeys(("id", "section", "chapter"), str)
+    known = {path.stem: pd.read_csv(path, dtype=text) for path in paths} | {chapter: rows}
+    return pd.concat([known[one] for one in sorted(known)], ignore_index=True)
+
+
+def _gather(rows: pd.DataFrame, folder: Path, name: str, chapter: str) -> None:
+    """Write a chapter's part of a table, and the table."""
+    (folder / name).mkdir(parents=True, exist_ok=True)
+    _write_atomically(rows, folder / name / f"{chapter}.csv")
+    _write_atomically(_with_others(rows, folder, name, chapter), folder / f"{name}.csv")
 
 
 def _write_atomically(table: pd.DataFrame, path: Path) -> None:

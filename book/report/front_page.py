@@ -166,6 +166,7 @@ def _rest(row: pd.Series) -> str:
         "Decides": decides,
         "Criteria": row["criterion"] if row["criterion"] != row["deciding_criterion"] else "",
         "Readings": row["readings"],
+        "“About” within": row["about"],
         "Amended": row["amended"],
     }
     shown = [f"{name}: {html.escape(text)}." for name, text in lines.items() if _said(text)]
@@ -183,6 +184,8 @@ def _row(row: pd.Series) -> str:
     claim = f"<details><summary>{html.escape(row['claim'])}</summary>{_rest(row)}</details>"
     if row["verdict"] == "depends on the reading":
         claim += f'<div class="readings">{html.escape(row["readings"])}</div>'
+    if len(set(re.findall(r": ([^;]+)", str(row["about"])))) > 1:
+        claim += f'<div class="readings">“About” within {html.escape(row["about"])}</div>'
     name = html.escape(row["id"])
     cells = {
         "id": f'<a href="{PAGES[int(row["chapter"])]}.html#verdicts">{name}</a>',

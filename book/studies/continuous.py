@@ -6,9 +6,8 @@ first, because on seeds 1000 to 1029 more of its seeds learned (10 against 6 of 
 
 The cap on an episode and the budget keep a seed that does not get out from running for ever. They
 were chosen on the same seeds: from its first success on, no seed that learned needed more than
-250,000 steps for an episode. The budget also ends seeds that drive well but took long to begin.
-Such a seed is judged by the last episodes it finished (`Curves`); chapter 3 counts one as a seed
-that did not learn, and `Curves(..., spare=False)` does so too.
+250,000 steps for an episode. The budget also ends seeds that drive well but took long to begin. As
+in chapter 3 such a seed counts as one that did not learn; `stopped_well` counts them.
 
 What was written with data known (the second readings of 4c, 4e and 4f) is judged on fresh seeds,
 which nobody had looked at when their criteria stood.
@@ -270,46 +269,28 @@ CLAIMS = (
 
 
 class Curves:
-    """Steps and returns per episode of each arm, one row a seed; NaN after a seed's end.
+    """Steps and returns per episode of each arm, one row a seed; NaN after a seed's end."""
 
-    A seed whose budget ends while it still gets out is not stuck. It is judged by what it did
-    before: the episode that the budget cut is left out, and smoothed curves keep their last value.
-    If it is not spared, it counts as stopped, the rule of chapter 3.
-    """
-
-    def __init__(
-        self, table: pd.DataFrame, seeds: range | None = None, *, spare: bool = True
-    ) -> None:
+    def __init__(self, table: pd.DataFrame, seeds: range | None = None) -> None:
         self.seeds = SEEDS if seeds is None else seeds
         self.rows = {str(arm): rows for arm, rows in table.groupby("arm", sort=False)}
-        self.ends, self.raw, self.smooth, self.returns = {}, {}, {}, {}
+        self.raw, self.smooth, self.returns = {}, {}, {}
         for arm, rows in self.rows.items():
-            cut = _cut_by_the_budget(rows) & spare
-            kept, shape = rows[~cut], {"seeds": self.seeds, "episodes": EPISODES}
-            ends = rows[cut].set_index("seed")["episode"].reindex(self.seeds) - 1
-            self.ends[arm] = ends.fillna(EPISODES).to_numpy(int)
-            self.raw[arm] = learning_curves(kept, **shape)
-            smooth = learning_curves(kept, **shape, window=WINDOW)
-            returns = learning_curves(kept, "return", **shape, window=WINDOW)
-            self.smooth[arm], self.returns[arm] = self._kept(arm, smooth), self._kept(arm, returns)
+            shape = {"seeds": self.seeds, "episodes": EPISODES}
+            self.raw[arm] = learning_curves(rows, **shape)
+            self.smooth[arm] = learning_curves(rows, **shape, window=WINDOW)
+            self.returns[arm] = learning_curves(rows, "return", **shape, window=WINDOW)
 
-    def _kept(self, arm: str, curves: np.ndarray) -> np.ndarray:
-        """Curves on which a seed cut by its budget keeps its last value."""
-        columns = np.minimum(np.arange(EPISODES), self.ends[arm][:, None] - 1)
-        return np.take_along_axis(curves, columns, axis=1)
-
-    def out_of_budget(self, arm: str) -> np.ndarray:
+    def cut(self, arm: str) -> np.ndarray:
         """Which seeds the budget ended while they still got out."""
-        return self.ends[arm] < EPISODES
+        rows = self.rows[arm]
+        return _cut_by_the_budget(rows).groupby(rows["seed"]).any().reindex(self.seeds).to_numpy()
 
-    def last(self, arm: str, length: int, episode: int | None = None) -> np.ndarray:
-        """Steps of so many episodes up to an episode or the last, of shape (seeds, length).
-
-        Of a seed that its budget has cut before, the last it finished. NaN where there are none.
-        """
-        padded = np.pad(self.raw[arm], ((0, 0), (length, 0)), constant_values=np.nan)
-        ends = np.minimum(self.ends[arm], episode or EPISODES)
-        return np.take_along_axis(padded, ends[:, None] + np.arange(length), axis=1)
+    def stopped_well(self, arm: str) -> np.ndarray:
+        """Which of these needed no more steps than one that learned, in what they finished."""
+        finished = self.rows[arm][~_cut_by_the_budget(self.rows[arm])]
+        steps = finished.groupby("seed")["steps"].apply(lambda one: one.iloc[-WINDOW:].median())
+        return self.cut(arm) & (steps.reindex(self.seeds) <= LEARNED).to_numpy()
 
     def at(self, arm: str, episode: int | None = None) -> np.ndarray:
         """Steps of each seed at an episode or the last; infinite where it had stopped before."""
@@ -323,7 +304,7 @@ class Curves:
 
     def learned(self, arm: str, episode: int | None = None) -> np.ndarray:
         """Which seeds had learned by an episode, or by the last."""
-        return learned(self.last(arm, WINDOW, episode), LEARNED, window=WINDOW)
+        return learned(self.raw[arm][:, : episode or EPISODES], LEARNED, window=WINDOW)
 
     def episodes_to(self, arm: str, steps: float = CONVERGED) -> np.ndarray:
         """Episodes until each seed first needs no more than `steps`; infinite if it never does."""
@@ -343,12 +324,12 @@ class Curves:
 
     def spread(self, arm: str) -> np.ndarray:
         """Interquartile range of each seed's steps in the last 500 episodes."""
-        low, high = np.quantile(self.last(arm, 500), [0.25, 0.75], axis=1)
+        low, high = np.quantile(self.raw[arm][:, -500:], [0.25, 0.75], axis=1)
         return np.where(np.isnan(high - low), np.inf, high - low)
 
     def relative_spread(self, arm: str) -> np.ndarray:
         """The same, divided by the median of those episodes."""
-        return self.spread(arm) / np.median(np.nan_to_num(self.last(arm, 500), nan=1.0), axis=1)
+        return self.spread(arm) / np.median(np.nan_to_num(self.raw[arm][:, -500:], nan=1.0), axis=1)
 
 
 def _cut_by_the_budget(rows: pd.DataFrame) -> pd.Series:
@@ -441,21 +422,18 @@ def _text(interval: Interval) -> str:
     return interval_text(interval)
 
 
-def wall_clock(results: Results) -> pd.DataFrame:
+def seconds(results: Results) -> pd.DataFrame:
     """Seconds one seed took, here and in the report."""
-    arms = {"as reported": (f"{ENV}, as reported, one seed", 60 * REPORTED_MINUTES)}
-    return shared.wall_clock(results, arms, "now, all seeds (s)")
+    return shared.seconds(
+        results, {"as reported": (f"{ENV}, as reported, one seed", 60 * REPORTED_MINUTES)}
+    )
 
 
-def median_seed(curves: Curves, arm: str) -> int:
-    """The seed in the middle of those that learned, by their steps at the end.
-
-    If none learned, of all seeds: a rule, not a pick.
-    """
+def middle(curves: Curves, arm: str) -> int:
+    """Place of the seed in the middle of those that learned, or of all if none did."""
     good = curves.learned(arm)
-    steps = np.where(good, curves.at(arm), np.inf)
-    order = np.argsort(steps, kind="stable")
-    return int(SEEDS[order[(max(int(good.sum()), 1) - 1) // 2]])
+    places = np.flatnonzero(good) if good.any() else np.arange(len(good))
+    return int(places[shared.middle(curves.at(arm)[places])])
 
 
 def findings(curves: Curves, fresh: Curves) -> list[Finding]:

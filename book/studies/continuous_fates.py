@@ -17,7 +17,7 @@ from studies.continuous import ENV, EXTREME, VARIANTS, Curves
 
 FATES = (
     "learned",
-    "still slow",
+    "slow or late",
     "never out",
     "out, then idle",
     "out, then pressing",
@@ -27,8 +27,9 @@ FATES = (
 def fates(curves: Curves, arm: str, log_sigma: np.ndarray) -> list[str]:
     """What became of each seed.
 
-    A seed that its budget ended while it still got out is judged like those that came to the last
-    episode. Another that ended in an episode that was stopped is stuck. What its policy does there
+    One that still gets out at its end, but needs too many steps, or has no budget left to come to
+    the last episode, is slow or late. Another that ended in an episode that was stopped is stuck.
+    What its policy does there
     follows from the cost: a step costs 0.1 (mu^2 + sigma^2) on average. It idles if the root mean
     square of mu is at most half the engine's force, and presses if it is more.
 
@@ -40,7 +41,7 @@ def fates(curves: Curves, arm: str, log_sigma: np.ndarray) -> list[str]:
         As the run ended with it.
     """
     found = []
-    outcomes = zip(SEEDS, curves.learned(arm), curves.out_of_budget(arm), strict=True)
+    outcomes = zip(SEEDS, curves.learned(arm), curves.cut(arm), strict=True)
     for position, (seed, good, cut) in enumerate(outcomes):
         rows = curves.rows[arm]
         rows = rows[rows["seed"] == seed]
@@ -48,7 +49,7 @@ def fates(curves: Curves, arm: str, log_sigma: np.ndarray) -> list[str]:
         if good:
             found.append("learned")
         elif cut or stopped.empty or rows["terminated"].iloc[-1]:
-            found.append("still slow")
+            found.append("slow or late")
         elif not rows["terminated"].any():
             found.append("never out")
         else:

@@ -1,4 +1,4 @@
-"""What the studies of several chapters share: evidence, the seed in the middle, texts."""
+"""What the studies of several chapters share: evidence, the seed in the middle, texts, times."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -33,16 +33,24 @@ def lower_evidence(one: np.ndarray, other: np.ndarray, rng: np.random.Generator)
     return Evidence(*probability_of_improvement(one, other, rng=rng), seeds=seeds)
 
 
-def middle_seed(steps: np.ndarray) -> int:
-    """The seed in the middle when all are ordered by their steps, the lower of two: not a pick.
+def middle(steps: np.ndarray) -> int:
+    """The place of the seed in the middle when all are ordered by their steps: not a pick.
+
+    A place counts from 0 among the seeds of an arm; it is no seed. Of two in the middle it is the
+    lower one.
 
     Parameters
     ----------
     steps : ndarray of shape (seeds,)
         In the order of the seeds; infinite where one does not get there.
+
+    Examples
+    --------
+    >>> middle(np.array([9.0, 5.0, 7.0, np.inf]))
+    2
     """
     order = np.argsort(steps, kind="stable")
-    return int(SEEDS[order[(len(order) - 1) // 2]])
+    return int(order[(len(order) - 1) // 2])
 
 
 def shown_seeds(steps: np.ndarray, good: np.ndarray) -> dict[str, int]:
@@ -64,7 +72,7 @@ def shown_seeds(steps: np.ndarray, good: np.ndarray) -> dict[str, int]:
     """
     order = np.argsort(steps, kind="stable")
     learners = [place for place in order if good[place]]
-    places = {"best": order[0], "middle": order[(len(order) - 1) // 2]}
+    places = {"best": order[0], "middle": middle(steps)}
     places |= {"worst that learned": learners[-1]} if learners else {}
     places |= {"failed": np.flatnonzero(~good)[0]} if not good.all() else {}
     return {text: int(place) for text, place in places.items()}
@@ -119,8 +127,8 @@ def interval_text(interval: tuple[float, float, float]) -> str:
     return "{} [{}, {}]".format(*texts)
 
 
-def wall_clock(results: Results, arms: dict[str, tuple[str, float]], total: str) -> pd.DataFrame:
-    """Seconds that one seed took, here and in the report.
+def seconds(results: Results, arms: dict[str, tuple[str, float]]) -> pd.DataFrame:
+    """Seconds that one seed took: here those of the processor, in the report by the clock.
 
     Parameters
     ----------
@@ -128,13 +136,11 @@ def wall_clock(results: Results, arms: dict[str, tuple[str, float]], total: str)
         With the arms.
     arms : dict of str to (str, float)
         For each arm what to call it, and the report's seconds.
-    total : str
-        The heading of the seconds of all seeds.
     """
     rows = []
-    for arm, (name, seconds) in arms.items():
+    for arm, (name, reported) in arms.items():
         made = results.provenance[results.provenance["arm"] == arm]
-        rows.append((name, seconds, made["seconds"].mean(), made["seconds"].sum()))
-        rows[-1] += (made["processor"].iloc[0],)
-    columns = ["experiment", "2018 (s)", "now (s, mean)", total, "processor"]
+        taken = made["processor_seconds"]
+        rows.append((name, reported, taken.mean(), taken.sum(), made["processor"].iloc[0]))
+    columns = ["experiment", "2018 (s)", "now (s, mean)", "now, all seeds (s)", "processor"]
     return pd.DataFrame(rows, columns=columns)
