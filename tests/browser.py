@@ -8,7 +8,7 @@ import os
 import re
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from io import StringIO
@@ -302,6 +302,11 @@ def targets(page: Page) -> list[str]:
     return [link for those in pages.values() for link in {those[0]: 0, those[-1]: 0}]
 
 
+def slowly(seconds: float) -> Callable[[Route], object]:
+    """A line on which everything takes so long."""
+    return lambda route: (time.sleep(seconds), route.continue_())
+
+
 @pytest.mark.parametrize("name", ["desk light", "phone light"])
 def test_a_link_from_the_front_page_lands_on_its_figure(browser, address, name):
     """Also if pictures and formulas are slow: what comes above must not push the target away."""
@@ -311,7 +316,7 @@ def test_a_link_from_the_front_page_lands_on_its_figure(browser, address, name):
         links = targets(page)
         assert len(links) > 6
         for these, seconds in (("**/*.png", 0.05), ("**/mathjax/**", 0.3)):
-            page.route(these, lambda route, s=seconds: (time.sleep(s), route.continue_()))
+            page.route(these, slowly(seconds))
         missed = {}
         for link in links:
             visit.go(link.removeprefix(f"{address}/"))
