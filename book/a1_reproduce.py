@@ -102,7 +102,7 @@ counted = chance(claims)
 glue("criteria", counted.criteria, display=False)
 glue("deciding", counted.claims, display=False)
 glue("random", counted.random, display=False)
-glue("by-chance", counted.by_chance, display=False)
+glue("by-chance", float(counted.by_chance), display=False)
 glue("near", len(counted.near), display=False)
 captioned(
     counted.near,
