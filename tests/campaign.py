@@ -318,6 +318,8 @@ INSIDE = {
     "sources": "about modules that are loaded",
     "statistics.Interval": "returned",
     "training.Failure": "returned",
+    "worlds.environments.native_action": "of a space and an action that were checked",
+    "worlds.environments.observed": "inside step; tests/test_environments.py",
     "training.Run": "returned",
     "training.Streams": "returned",
     "training.Training": "given to learners by train_seeds",
