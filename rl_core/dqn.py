@@ -390,6 +390,5 @@ def dqn(
             _train(world, config, training)
 
     seeds = one_seed_of(env, seeds)
-    return train_seeds(
-        train, episodes=episodes, seeds=seeds, snapshots=snapshots, progress=progress
-    )
+    told = {"snapshots": snapshots, "progress": progress, "env": env, "config": config}
+    return train_seeds(train, episodes=episodes, seeds=seeds, **told)

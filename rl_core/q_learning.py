@@ -240,7 +240,7 @@ def q_learning(
         failures += [] if failure is None else [failure]
         if progress is not None:
             progress((i + 1) * episodes, env_steps(record))
-    return Run(as_table(record, seeds), arrays, tuple(failures))
+    return Run(as_table(record, seeds), arrays, tuple(failures), env, config)
 
 
 def check_q_learning(env: object, config: object) -> None:

@@ -260,7 +260,8 @@ def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator)
             sigma = {"log_sigma": log_sigma.detach().numpy()} if policy.gaussian else {}
             return {**modules.as_arrays(module), **sigma}
 
-        return _Agent(ModuleActor(policy, module, log_sigma), learner.learn, by_name)
+        actor = ModuleActor(policy, module, log_sigma, np.empty(policy.action_width))
+        return _Agent(actor, learner.learn, by_name)
     biases = config.network.biases
     parameters = initial_parameters(policy, config.policy, rng)
 
@@ -386,6 +387,5 @@ def reinforce(
             _train(world, config, training)
 
     seeds = one_seed_of(env, seeds)
-    return train_seeds(
-        train, episodes=episodes, seeds=seeds, snapshots=snapshots, progress=progress
-    )
+    told = {"snapshots": snapshots, "progress": progress, "env": env, "config": config}
+    return train_seeds(train, episodes=episodes, seeds=seeds, **told)

@@ -1,5 +1,6 @@
 """What the learners share: streams of random numbers, the loop over seeds, tables and failures."""
 
+import importlib
 import math
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -10,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from rl_core.checks import distinct_seeds, instance, integer, integers
+from rl_core.checks import distinct_seeds, instance, integer, integers, require
 
 PROGRESS_EVERY = 10
 """Episodes between two reports of progress."""
@@ -53,11 +54,47 @@ class Run:
         the seeds asked for.
     failures : tuple of Failure
         Seeds that diverged. Their rows up to the failure stay in `table`.
+    env, config : object
+        What was trained on, and with.
     """
 
     table: pd.DataFrame
     arrays: dict[str, np.ndarray] = field(default_factory=dict)
     failures: tuple[Failure, ...] = ()
+    env: Any = None
+    config: Any = None
+
+    def agent(self, seed: int, moment: str = "", rng: np.random.Generator | None = None) -> Any:
+        """Return what a seed has learned, as an `rl_core.evaluation.Agent`.
+
+        Parameters
+        ----------
+        seed : int
+            One of those trained.
+        moment : str
+            As for `weights_of`: "" for the last weights.
+        rng : numpy.random.Generator, optional
+            What the agent draws from; by default one of seed 0.
+
+        Raises
+        ------
+        TypeError, ValueError
+            There is no such seed or moment, or the run does not say what it was trained with.
+
+        Examples
+        --------
+        >>> from rl_core.reinforce import ReinforceConfig, reinforce
+        >>> run = reinforce("CartPole-v1", ReinforceConfig(), episodes=1, seeds=[0])
+        >>> agent = run.agent(seed=0)
+        >>> action, _ = agent.predict([0.0, 0.0, 0.1, 0.0])
+        """
+        seeds = self.table["seed"].unique().tolist()
+        require(seed in seeds, "seed", seed, f"one of {seeds}")
+        weights = weights_of(self.arrays, seeds.index(seed), moment)
+        # By name, since an import would make what plays episodes a part of what trains (`sources`).
+        evaluation = importlib.import_module("rl_core.evaluation")
+        spaces = None if self.env is None else evaluation.spaces_of(self.env)
+        return evaluation.as_learned(self.config, weights, spaces=spaces, env=self.env, rng=rng)
 
 
 class Streams(NamedTuple):
@@ -186,6 +223,8 @@ def train_seeds(
     seeds: Any,
     snapshots: Any = (),
     progress: Progress | None = None,
+    env: Any = None,
+    config: Any = None,
 ) -> Run:
     """Train one seed after the other; they share nothing.
 
@@ -202,6 +241,8 @@ def train_seeds(
     progress : callable, optional
         Called now and then with the episodes and environment steps done, over all seeds. A seed
         that ended early counts with all its episodes.
+    env, config : object
+        For the `Run`, so that it can make agents.
 
     Raises
     ------
@@ -241,6 +282,8 @@ def train_seeds(
         pd.concat([one.table() for one in done], ignore_index=True),
         _stacked([one.arrays(snapshots) for one in done]),
         tuple(one.failure for one in done if one.failure is not None),
+        env,
+        config,
     )
 
 

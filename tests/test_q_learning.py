@@ -14,7 +14,7 @@ from odd_values import ODD, PLAIN, try_out
 from test_appraisal import loss
 from toy_task import Corridor
 
-from rl_core.evaluation import evaluate_table
+from rl_core.evaluation import evaluate, of_table
 from rl_core.exploration import (
     EpsilonGreedy,
     Geometric,
@@ -310,7 +310,9 @@ def test_it_learns_mountain_car():
         assert steps.tail(100).median() < min(350, steps.head(20).median() / 2)
         Q = run.arrays["Q"][position]
         world = gridded("MountainCar-v0", 10)
-        played = evaluate_table(world, Q, seed=seed, episodes=20, max_steps=5_000)
+        played = evaluate(
+            "MountainCar-v0", of_table(world, Q), seed=seed, episodes=20, max_steps=5_000
+        )
         assert played["steps"].median() < 350
 
 

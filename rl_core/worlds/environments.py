@@ -31,6 +31,10 @@ EnvironmentLike = (
 """An id, an id with arguments, an import path, a task, an environment, or a function making one."""
 
 
+BYTE = np.float32(1 / 255)
+"""What a byte of an observation counts."""
+
+
 class TaskWorld:
     """A compiled task.
 
@@ -66,7 +70,7 @@ class GymnasiumWorld:
     """Any Gymnasium environment with Box observations and Discrete or Box actions.
 
     Its time limit, if it has one, ends an episode as truncated. Observations are flattened and cast
-    to float32.
+    to float32; bytes are scaled to 0..1 (`write_numbers`).
 
     Parameters
     ----------
@@ -131,7 +135,7 @@ class GymnasiumWorld:
         array = type(seen) is np.ndarray
         if not array or seen.shape != self._shape or seen.dtype.kind not in "fiub":
             seen = self._numbers(seen)
-        following[:] = seen if self._flat else seen.ravel()
+        write_numbers(seen if self._flat else seen.ravel(), following)
 
     def _numbers(self, seen: Any) -> NDArray[Any]:
         """Return an observation that is no array as one, if its numbers and shape are right."""
@@ -157,6 +161,22 @@ class GymnasiumWorld:
 
 
 World = TaskWorld | GymnasiumWorld
+
+
+def write_numbers(seen: NDArray[Any], numbers: NDArray[np.float32]) -> None:
+    """Write what is observed as float32; bytes (pictures) are scaled from 0..255 to 0..1.
+
+    Examples
+    --------
+    >>> numbers = np.empty(2, np.float32)
+    >>> write_numbers(np.array([0, 255], np.uint8), numbers)
+    >>> numbers
+    array([0., 1.], dtype=float32)
+    """
+    if seen.dtype == np.uint8:
+        np.multiply(seen, BYTE, out=numbers)
+    else:
+        numbers[:] = seen
 
 
 def checked_reward(env: object, reward: Any) -> float:
