@@ -387,5 +387,10 @@ def reinforce(
             _train(world, config, training)
 
     seeds = one_seed_of(env, seeds)
-    told = {"snapshots": snapshots, "progress": progress, "env": env, "config": config}
+    told: dict[str, Any] = {
+        "snapshots": snapshots,
+        "progress": progress,
+        "env": env,
+        "config": config,
+    }
     return train_seeds(train, episodes=episodes, seeds=seeds, **told)

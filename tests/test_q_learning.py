@@ -303,6 +303,24 @@ GRID = QLearningConfig(
 )
 
 
+def test_tables_beyond_what_the_machine_has_are_refused():
+    """A million bins of each of two numbers: 48 TB of values and as much of visits."""
+    config = dataclasses.replace(GRID, bins=45_000)
+    for refused in (
+        lambda: check_q_learning("MountainCar-v0", config),
+        lambda: q_learning("MountainCar-v0", config, episodes=1, seeds=[0]),
+    ):
+        with pytest.raises(ValueError, match=r"^bins must be less: it would take .* GiB of memory"):
+            refused()
+
+
+def test_a_rule_that_never_ends_meets_a_budget():
+    assert QLearningConfig().max_env_steps is not None
+    config = QLearningConfig(exploration=EpsilonGreedy(0.0), max_env_steps=500)
+    run = q_learning(Maze().model(), config, episodes=10_000, seeds=[0])
+    assert run.table["env_steps"].iloc[-1] == 500
+
+
 def test_it_learns_mountain_car():
     run = q_learning("MountainCar-v0", GRID, episodes=1_000, seeds=[100, 101, 102])
     for position, seed in enumerate((100, 101, 102)):

@@ -62,6 +62,7 @@ def table_config(name: str, bins: int, limit: int = TABLE_CAP) -> QLearningConfi
         step_size=0.3,
         exploration=EpsilonGreedy(Linear(1.0, 0.02, episodes=500)),
         max_steps=limit,
+        max_env_steps=None,
         evaluation=Trials(every=TABLE_EPISODES, episodes=1, max_steps=1),  # done below
         bins=bins,
         levels=LEVELS[name],

@@ -43,6 +43,8 @@ class TaskWorld:
     task : rl_core.worlds.tasks.Task
     """
 
+    as_bytes = False
+
     def __init__(self, task: Task) -> None:
         self.n_observations = task.n_observations
         self.n_actions = task.n_actions
@@ -91,6 +93,7 @@ class GymnasiumWorld:
         if not isinstance(actions, spaces.Discrete | spaces.Box):
             raise ValueError(f"env must have a Discrete or a Box action space, got {actions}")
         self.n_observations = math.prod(observations.shape)
+        self.as_bytes = observations.dtype == np.uint8
         self.n_actions = int(actions.n) if isinstance(actions, spaces.Discrete) else 0
         self.action_dimensions = math.prod(actions.shape) if isinstance(actions, spaces.Box) else 0
         self.max_episode_steps: int | None = None
