@@ -145,6 +145,7 @@ class Agent:
 
         Examples
         --------
+        >>> import numpy as np
         >>> from rl_core.evaluation import of_values
         >>> agent = of_values({"layer0.weight": np.array([[1, 2]], np.float32)})
         >>> agent.predict(np.ones(1)), agent.predict(np.ones((2, 1)))[0]
@@ -179,7 +180,7 @@ class Agent:
         env = self.env if isinstance(self.env, str | Make) else None
         about: dict[str, Any] = {"format": FORMAT, "config": describe(self.config)}
         about |= {"env": describe(env, "env"), "spaces": []}
-        arrays = {f"weights {name}": array for name, array in self.weights.items()}
+        arrays: dict[str, Any] = {f"weights {name}": array for name, array in self.weights.items()}
         for space in self.spaces:
             if isinstance(space, spaces.Discrete):
                 about["spaces"].append({"n": int(space.n), "start": int(space.start)})
@@ -357,6 +358,10 @@ def as_learned(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.evaluation import as_learned
+    >>> from rl_core.policies import MLP
+    >>> from rl_core.reinforce import ReinforceConfig
     >>> weights = {"layer0.weight": np.zeros((2, 3), np.float32)}
     >>> as_learned(ReinforceConfig(network=MLP(())), weights).actor.policy.sizes
     array([2, 3])
@@ -387,8 +392,8 @@ def _actor(config: Any, weights: Mapping[str, NDArray[Any]], spaces: Spaces | No
     distribution = Categorical() if isinstance(config, DQNConfig) else config.policy
     policy = make_policy(distribution, (), n_seen, n_actions, n_components)
     own = {name: array for name, array in weights.items() if name != "log_sigma"}
-    sizes = policy.sizes.tolist()
-    module = modules.make_module(config.network, *sizes, np.random.default_rng(0))  # type: ignore[arg-type]
+    n_in, n_out = policy.sizes.tolist()
+    module = modules.make_module(config.network, n_in, n_out, np.random.default_rng(0))
     modules.load_arrays(module, own)
     log_sigma = torch.tensor(weights.get("log_sigma", np.zeros(0, np.float32)))
     return ModuleActor(
@@ -420,7 +425,8 @@ def _perceptron_actor(
 
 
 def _last_epsilon(config: DQNConfig) -> float:
-    return float(getattr(config.epsilon, "end", config.epsilon))
+    epsilon: Any = config.epsilon
+    return float(getattr(epsilon, "end", epsilon))
 
 
 def _table_actor(
@@ -465,6 +471,8 @@ def of_table(world: GriddedTask, Q: NDArray[np.float64], epsilon: float = 0.0) -
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.evaluation import evaluate, of_table
     >>> from rl_core.worlds.discretise import gridded
     >>> world = gridded("MountainCar-v0", 10)
     >>> agent = of_table(world, np.zeros(world.shape))
@@ -481,6 +489,8 @@ def of_values(weights: Mapping[str, NDArray[np.float32]], epsilon: float = 0.0) 
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.evaluation import COLD, of_values
     >>> agent = of_values({"layer0.weight": np.array([[1, 2]], np.float32)})
     >>> agent.actor.parameters[:2] / COLD
     array([1., 2.], dtype=float32)
@@ -499,6 +509,10 @@ def greedy(agent: Agent) -> Agent:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.evaluation import Agent, COLD, greedy
+    >>> from rl_core.kernels import likelihood
+    >>> from rl_core.kernels.likelihood import Policy
     >>> policy = Policy(np.array([1, 2]), False, False, False, 1)
     >>> agent = Agent(likelihood.make_actor(policy, np.array([1, 2, 0, 0], np.float32)))
     >>> greedy(agent).actor.parameters / COLD
@@ -528,6 +542,7 @@ def uniform(n_observations: int, n_actions: int) -> Agent:
 
     Examples
     --------
+    >>> from rl_core.evaluation import uniform
     >>> uniform(6, 3).actor.parameters.any()
     np.False_
     """
@@ -541,6 +556,7 @@ def evaluation_streams(seed: int) -> tuple[int, np.random.Generator]:
 
     Examples
     --------
+    >>> from rl_core.evaluation import evaluation_streams
     >>> evaluation_streams(0)[0] == evaluation_streams(1)[0]
     False
     """
@@ -594,6 +610,7 @@ def evaluate(
 
     Examples
     --------
+    >>> from rl_core.evaluation import evaluate, uniform
     >>> table = evaluate("MountainCar-v0", uniform(2, 3), seed=0, episodes=2, max_steps=50)
     >>> table["return"].tolist(), table["terminated"].tolist()
     ([-50.0, -50.0], [False, False])
@@ -656,6 +673,8 @@ def check_fit(agent: Agent, world: World) -> None:
 
     Examples
     --------
+    >>> from rl_core.evaluation import check_fit, uniform
+    >>> from rl_core.worlds.environments import open_world
     >>> check_fit(uniform(2, 5), open_world("MountainCar-v0"))
     Traceback (most recent call last):
     ValueError: agent must be a categorical policy of 3 actions, got a categorical policy of 5
@@ -724,7 +743,9 @@ def _drawn(env: Any) -> gymnasium.Env[Any, Any]:
     picture: dict[str, Any] = {"render_mode": "rgb_array"}
     if isinstance(env, str) and found is None:
         task = twin(env)
-        limit = {} if task is None else {"max_episode_steps": task.max_episode_steps or -1}
+        limit: dict[str, Any] = (
+            {} if task is None else {"max_episode_steps": task.max_episode_steps or -1}
+        )
         made: Any = gymnasium.make(env, **picture, **limit)
     elif isinstance(env, Make):
         made = gymnasium.make(env.id, **{**env.arguments, **picture})
@@ -790,6 +811,8 @@ def rollout(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.evaluation import rollout, uniform
     >>> episode = rollout("MountainCar-v0", uniform(2, 3), np.random.default_rng(0), 100)
     >>> episode.observations.shape, episode.terminated
     ((101, 2), False)
@@ -831,6 +854,8 @@ def action_values(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.evaluation import action_values
     >>> weights = {"layer0.weight": np.array([[1, 2, 3], [0, 0, 10]], np.float32)}
     >>> action_values(weights, np.array([[1.0, 1.0]]))
     array([[ 1.,  2., 13.]], dtype=float32)
@@ -867,6 +892,10 @@ def mean_actions(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.evaluation import mean_actions
+    >>> from rl_core.policies import Gaussian, MLP
+    >>> from rl_core.reinforce import ReinforceConfig
     >>> config = ReinforceConfig(network=MLP(()), policy=Gaussian(mean="direct"))
     >>> weights = {"layer0.weight": np.array([[1], [2]]), "log_sigma": np.zeros(1)}
     >>> mean_actions(config, weights, np.array([[1.0, 10.0]]))
@@ -912,6 +941,9 @@ def state_grid(space: spaces.Box, points: int) -> NDArray[np.float32]:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from gymnasium import spaces
+    >>> from rl_core.evaluation import state_grid
     >>> space = spaces.Box(np.array([0, -1], np.float32), np.array([1, 1], np.float32))
     >>> state_grid(space, 2).tolist()
     [[0.0, -1.0], [0.0, 1.0], [1.0, -1.0], [1.0, 1.0]]

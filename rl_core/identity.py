@@ -54,6 +54,7 @@ def import_path(name: str, thing: object, allowed: str = "a class or function") 
 
     Examples
     --------
+    >>> from rl_core.identity import canonical_json
     >>> from rl_core.identity import import_path
     >>> import_path("rule", canonical_json)
     'rl_core.identity:canonical_json'
@@ -173,6 +174,7 @@ def imported(name: str, path: object) -> Any:
 
     Examples
     --------
+    >>> from rl_core.identity import imported
     >>> imported("shaping", "math:floor")(2.5)
     2
     >>> imported("shaping", "math:flour")
@@ -203,6 +205,7 @@ def code_behind(path: str) -> str:
 
     Examples
     --------
+    >>> from rl_core.identity import code_behind
     >>> len(code_behind("rl_core.maze:Maze"))
     64
     """

@@ -123,6 +123,7 @@ def spawn_streams(seed: int) -> Streams:
 
     Examples
     --------
+    >>> from rl_core.training import spawn_streams
     >>> bool(spawn_streams(0).policy.random() == spawn_streams(0).policy.random())
     True
     >>> bool(spawn_streams(0).policy.random() == spawn_streams(1).policy.random())
@@ -148,6 +149,7 @@ class Training:
 
     Examples
     --------
+    >>> from rl_core.training import Training
     >>> training = Training(seed=0, episodes=3, snapshots=(), report=lambda episodes, steps: None)
     >>> for episode in training.course(max_env_steps=25):
     ...     training.add(steps=10, total=-10.0, terminated=True)
@@ -251,6 +253,8 @@ def train_seeds(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.training import train_seeds
     >>> def train(training):
     ...     for _ in training.course(None):
     ...         training.add(steps=7, total=1.0, terminated=True)
@@ -317,6 +321,8 @@ def weights_of(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.training import weights_of
     >>> arrays = {f"{moment}layer0.weight": np.zeros((30, 2, 3)) for moment in ("", "initial/")}
     >>> weights_of(arrays, 0, "initial/")["layer0.weight"].shape
     (2, 3)
