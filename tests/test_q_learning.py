@@ -304,7 +304,7 @@ GRID = QLearningConfig(
 
 
 def test_tables_beyond_what_the_machine_has_are_refused():
-    """A million bins of each of two numbers: 48 TB of values and as much of visits."""
+    """Of 45,000 bins a number the car has two thousand million cells, for three actions each."""
     config = dataclasses.replace(GRID, bins=45_000)
     for refused in (
         lambda: check_q_learning("MountainCar-v0", config),
