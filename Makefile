@@ -30,7 +30,7 @@ endif
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup book chapter lab zip pdf picture test lint types unit pairing notebooks browser hostile \
+.PHONY: help setup announce book chapter lab zip pdf picture test lint types unit pairing notebooks browser hostile \
 	sync bench clean .venv/install
 
 help: ## list the targets
@@ -49,7 +49,11 @@ setup: ## make .venv with the pinned environment and the package
 	@$(BIN)/python -m pip install --quiet --requirement environment.txt
 	@$(BIN)/python -m pip install --quiet --no-build-isolation --no-deps --editable .
 
-book: setup ## execute the notebooks, build the site into _build/html (first look: make book SEEDS=3)
+# What is coming is said before the minutes that the environment takes.
+announce:
+	@test -e .venv/.installed || SEEDS=$(SEEDS) "$(PYTHON)" book/web/announce.py
+
+book: announce setup ## execute the notebooks, build the site into _build/html (first look: make book SEEDS=3)
 	@SEEDS=$(SEEDS) $(STAMP) $(COMPLETE) $(SOURCES:%=--in %) --also "$$($(BIN)/python --version)" \
 		-- python book/web/build.py
 	@echo "The $(if $(filter-out 30,$(SEEDS)),preview ($(SEEDS) seeds),book) is at file://$(CURDIR)/$(SITE)/index.html"

@@ -463,3 +463,33 @@ captioned(
 # contraction. Decisions are settled long before the values are. A round of policy iteration costs more than a
 # sweep of value iteration, and it needs fewer of them. And action values carry their own decisions, which is why the next chapter, where the model is
 # taken away, learns $q_*$ and not $v_*$.
+
+
+# %% [markdown]
+# ## Exercises
+#
+# **1.** How many sweeps does value iteration take on the Maze if the agent looks further ahead? Compare the discounts 0.9 and 0.99, with the same bound on the error.
+
+# %% tags=["hide-cell"]
+from rl_core.maze import Maze
+from rl_core.planning import value_iteration
+
+model = Maze().model()
+{
+    gamma: len(value_iteration(model, gamma=gamma, tolerance=1e-6, progress=False).table)
+    for gamma in (0.9, 0.99)
+}
+
+# %% [markdown]
+# **2.** What is an agent worth that cannot slip? Solve the Maze with `slip=0` and compare the value of the start.
+
+# %% tags=["hide-cell"]
+from rl_core.maze import Maze
+from rl_core.planning import value_iteration
+
+worth = {}
+for slip in (0.1, 0.0):
+    model = Maze(slip=slip).model()
+    solution = value_iteration(model, gamma=0.9, tolerance=1e-6, progress=False)
+    worth[slip] = round(float(solution.V[model.start_state[0]]), 3)
+worth

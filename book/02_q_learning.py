@@ -90,7 +90,9 @@ listing("rl_core.q_learning:_update", "One update:")
 # Figure 9 in code, with the standard ε:
 
 # %%
-reported = QLearningConfig(gamma=0.9, step_size=0.2, exploration=EpsilonGreedy(0.9))
+reported = QLearningConfig(
+    gamma=0.9, step_size=0.2, exploration=EpsilonGreedy(0.9), max_env_steps=None
+)
 assert reported == study.FIGURE_9.config
 
 # %% tags=["hide-input"]
@@ -684,3 +686,40 @@ captioned(
 # learner: here most of it is in states that do not exist for the agent. A constant step size has a price, noise that never
 # dies down, and it can be computed. Being close to $q_*$ and behaving well while learning are different goals, and
 # no constant gets as much of both as a schedule. And a rule tried once may be a rule about one seed.
+
+
+# %% [markdown]
+# ## Exercises
+#
+# **1.** With a step size of 1 the newest sample replaces what was known. Where does the error end, beside a step size of 0.2?
+
+# %% tags=["hide-cell"]
+from rl_core.exploration import EpsilonGreedy
+from rl_core.q_learning import QLearningConfig, q_learning_on_model
+
+{
+    step_size: q_learning_on_model(
+        "rl_core/Maze-v0",
+        QLearningConfig(step_size=step_size, exploration=EpsilonGreedy(0.9)),
+        episodes=1_000,
+        seeds=[0],
+    )
+    .table["error_norm"]
+    .tail(100)
+    .mean()
+    .round(1)
+    for step_size in (0.2, 1.0)
+}
+
+# %% [markdown]
+# **2.** Learn another world: Gymnasium's frozen lake, which is as slippery. How often does the greedy agent cross it?
+
+# %% tags=["hide-cell"]
+from rl_core.evaluation import evaluate, greedy
+from rl_core.exploration import EpsilonGreedy
+from rl_core.q_learning import QLearningConfig, q_learning_on_model
+
+config = QLearningConfig(gamma=0.99, step_size=0.1, exploration=EpsilonGreedy(0.5))
+lake = q_learning_on_model("FrozenLake-v1", config, episodes=5_000, seeds=[0])
+tried = evaluate("FrozenLake-v1", greedy(lake.agent(0)), seed=0, episodes=200, max_steps=100)
+float(tried["return"].mean())

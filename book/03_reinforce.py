@@ -478,3 +478,39 @@ for name in study.ENVIRONMENTS:
 # is the discount: with 0.9, {glue:text}`acrobot-gamma-0.9` and {glue:text}`mountaincar-gamma-0.9` of {glue:text}`seeds` seeds learn. Whether MountainCar needs a second layer depends on how
 # wide the first one is. On Acrobot, where the report thought two layers needed, {glue:text}`seeds` seeds cannot show a difference to one of 10 units. And a single published
 # curve is the curve of one seed: it says that a method *can* work, not that it does.
+
+
+# %% [markdown]
+# ## Exercises
+#
+# **1.** What does normalising the returns do? Train one seed on Acrobot with and without, and compare the steps of the last episodes.
+
+# %% tags=["hide-cell"]
+from rl_core.reinforce import ReinforceConfig, reinforce
+
+{
+    how: reinforce(
+        "Acrobot-v1",
+        ReinforceConfig(normalise=how, max_episode_steps=2_000),
+        episodes=200,
+        seeds=[0],
+    )
+    .table["steps"]
+    .tail(50)
+    .median()
+    for how in ("standard", "none")
+}
+
+# %% [markdown]
+# **2.** Write the loss of REINFORCE for one step by hand, with two actions of equal preference, and let torch differentiate it. By how much does the preference for the action taken rise, for a return of 1?
+
+# %% tags=["hide-cell"]
+import torch
+
+preferences = torch.zeros(2, requires_grad=True)
+v, action = 1.0, 0
+loss = -v * torch.log_softmax(preferences, 0)[action]
+loss.backward()
+(
+    -preferences.grad
+).tolist()  # one minus the probability for it, minus the probability for the other

@@ -102,7 +102,7 @@ listing("rl_core.dqn:act", "The action.")
 # The reported configuration for Acrobot, as code, is this. MountainCar's has a memory of 4,000, learns from step 4,000 on, and has its own shaping and stop.
 
 # %%
-reported = DQNConfig(
+reported = DQNConfig.report_2018(
     gamma=0.99,
     network=MLP((10, 20), biases=False),
     learning_rate=0.001,  # of RMSProp
@@ -649,3 +649,32 @@ captioned(
 # **Why does the report's shaping help, then?** Not because replay then has something to see: it learns without, too. Shaping pays for every step away from the middle, so that the car swings out, and so finds the flag. And its values need
 # neither the end of the episode nor biases: the shaped arms have neither. (The two reasons are guesses; no arm parts them.) It has a price. On MountainCar the return it adds up to ranks policies the wrong way round; on Acrobot it ranks them almost
 # as the steps do. Chapter 6 measures both.
+
+
+# %% [markdown]
+# ## Exercises
+#
+# **1.** The report's settings wait for goals to lower epsilon. On CartPole every episode ends. Compare them with the defaults of `DQNConfig`: what is the best mean return of 20 episodes in a row, within the same budget of steps?
+
+# %% tags=["hide-cell"]
+from rl_core.dqn import DQNConfig, dqn
+
+budget = {"max_env_steps": 8_000}
+{
+    name: dqn("CartPole-v1", config, episodes=8_000, seeds=[0])
+    .table["return"]
+    .rolling(20)
+    .mean()
+    .max()
+    for name, config in (
+        ("report", DQNConfig.report_2018(batch_size=32, **budget)),
+        ("defaults", DQNConfig(**budget)),
+    )
+}
+
+# %% [markdown]
+# **2.** The target of a transition: compute it by hand for a reward of −1, a discount of 0.99 and next values of −3 and −2, for a step that ends at the goal and for one that was cut off.
+
+# %% tags=["hide-cell"]
+reward, gamma, following = -1.0, 0.99, (-3.0, -2.0)
+{"goal": reward, "cut off": round(reward + gamma * max(following), 2)}

@@ -594,3 +594,38 @@ glue("closest-steps", float(np.median(curves.at(best, 3_000)[curves.learned(best
 # decides is whether the first weights and the noise get the car out at all. σ is above all the chance to begin: with σ = 1, {glue:text}`learned sigma 1` seeds learn.
 # Of all arms, *{glue:text}`closest`* comes closest to the report's 200 steps after 3,000 episodes, with {glue:text}`closest-steps:.0f` (median of its seeds that learned).
 # And the report judges σ by steps, while the environment pays for forces: it is the return that shows what noise costs.
+
+
+# %% [markdown]
+# ## Exercises
+#
+# **1.** How far does noise alone get the car? Let an untrained policy drive with a small and a large sigma, and count the episodes that arrive in 999 steps.
+
+# %% tags=["hide-cell"]
+from rl_core.evaluation import evaluate
+from rl_core.policies import Gaussian
+from rl_core.reinforce import ReinforceConfig, reinforce
+
+arrived = {}
+for sigma in (0.5, 3.0):
+    config = ReinforceConfig(policy=Gaussian(sigma=sigma), max_episode_steps=999)
+    run = reinforce("MountainCarContinuous-v0", config, episodes=1, seeds=[0])
+    untrained = run.agent(0, "initial/")
+    played = evaluate("MountainCarContinuous-v0", untrained, seed=0, episodes=50, max_steps=999)
+    arrived[sigma] = int(played["terminated"].sum())
+arrived
+
+# %% [markdown]
+# **2.** What does it cost to push with noise? The environment charges a tenth of the squared force. Compute the expected charge of a step with mean force 0.5 for the two sigmas of the figures, 0.3 and 0.5, and check it by drawing.
+
+# %% tags=["hide-cell"]
+import numpy as np
+
+drawn = np.random.default_rng(0).normal(size=100_000)
+{
+    sigma: (
+        round(0.1 * (0.5**2 + sigma**2), 4),
+        round(float((0.1 * (0.5 + sigma * drawn) ** 2).mean()), 4),
+    )
+    for sigma in (0.3, 0.5)
+}

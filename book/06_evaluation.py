@@ -438,3 +438,29 @@ captioned(details(findings), "Table 6.11. Each criterion with its evidence.")
 # **What to take along.** Steps and returns are two names for one thing only while every step costs the same. Say under which time limit an
 # agent was trained, under which it was evaluated, and with how much of its noise: each of the three can turn a success into a
 # failure. And before reaching for a network, try the table of chapter 2: in two dimensions it is a strong opponent.
+
+
+# %% [markdown]
+# ## Exercises
+#
+# **1.** An agent that acts at random is a yardstick too. In what share of episodes does it swing Acrobot up within Gymnasium's limit of 500 steps?
+
+# %% tags=["hide-cell"]
+from rl_core.evaluation import evaluate, uniform
+
+random_agent = evaluate("Acrobot-v1", uniform(6, 3), seed=0, episodes=200, max_steps=500)
+float(random_agent["terminated"].mean())
+
+# %% [markdown]
+# **2.** How many seeds does an interval want? Draw the median of the first 3, 10 and all seeds of a made-up arm with its 95% interval.
+
+# %% tags=["hide-cell"]
+import numpy as np
+
+from rl_core.statistics import bootstrap_interval
+
+steps = np.random.default_rng(1).lognormal(mean=5, sigma=0.7, size=30)
+{
+    n: tuple(round(float(x)) for x in bootstrap_interval(steps[:n], rng=np.random.default_rng(0)))
+    for n in (3, 10, 30)
+}

@@ -9,6 +9,7 @@ as a TypeError if the value is of another kind altogether, else as a ValueError.
 """
 
 import math
+import os
 from collections.abc import Callable, Collection, Iterable
 from numbers import Integral, Real
 from typing import Any, NoReturn
@@ -247,6 +248,27 @@ def floats(
             f"{name} must be {'finite' if finite else 'without NaN'}, at {at} it is {array[at]}"
         )
     return array
+
+
+def in_memory(name: str, value: object, room: int) -> None:
+    """Raise a ValueError if what a value asks for, in bytes, is more than the machine has.
+
+    Examples
+    --------
+    >>> in_memory("bins", 10**6, 2**80)
+    Traceback (most recent call last):
+    ValueError: bins must be less: it would take 1,125,899,906,842,624.0 GiB of memory, and...
+    """
+    try:
+        has = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, OSError, ValueError):  # it does not tell
+        return
+    if room > has:
+        allowed = (
+            f"less: it would take {room / 2**30:,.1f} GiB of memory, and this machine has "
+            f"{has / 2**30:,.1f}"
+        )
+        _refuse(ValueError, name, value, allowed)
 
 
 def fields(config: object, **rules: tuple[Any, ...]) -> None:

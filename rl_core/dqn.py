@@ -22,7 +22,7 @@ from contextlib import closing
 from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 import torch
@@ -30,13 +30,30 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from rl_core import modules
-from rl_core.checks import fields, instance, integer, number, one_of, optional, positive, truth
-from rl_core.exploration import Epsilon, HalfWay, check_epsilon, schedule_state
+from rl_core.checks import (
+    fields,
+    in_memory,
+    instance,
+    integer,
+    number,
+    one_of,
+    optional,
+    positive,
+    truth,
+)
+from rl_core.exploration import Epsilon, HalfWay, Linear, check_epsilon, schedule_state
 from rl_core.kernels import networks, q_update
 from rl_core.kernels.choices import VALUE, after_copy, after_goal, after_step, greedy_action
 from rl_core.kernels.compiled import compiled
 from rl_core.kernels.q_update import ACTION, COPIES, KEPT, STEPS, UPDATES, Learner, Settings
-from rl_core.kernels.replay import Memory, make_memory, sample, store
+from rl_core.kernels.replay import (
+    Memory,
+    bytes_a_transition,
+    make_memory,
+    sample,
+    scaled,
+    store,
+)
 from rl_core.policies import MLP, Network, check_network
 from rl_core.training import Progress, Run, Training, spawn_streams, train_seeds
 from rl_core.worlds.environments import (
@@ -55,7 +72,7 @@ WENT_ON, DIVERGED, SHAPED_NAN = range(3)
 
 @dataclass(frozen=True)
 class DQNConfig:
-    """What DQN is run with. Defaults: the report's for Acrobot, but with a terminal flag.
+    """What DQN is run with. The defaults learn small tasks; `report_2018` are the report's.
 
     Attributes
     ----------
@@ -69,7 +86,7 @@ class DQNConfig:
         The optimiser's step size alpha, above 0.
     batch_size, memory_size : int
         Transitions an update, and transitions kept, at least a batch. As many as a batch: no
-        replay, only the latest ones.
+        replay, only the latest ones. Observations that are bytes are kept as bytes.
     learning_starts, update_every : int
         Environment steps before the first update (the report waits until the memory is full), and
         from one to the next.
@@ -99,20 +116,21 @@ class DQNConfig:
 
     Examples
     --------
-    >>> DQNConfig(shaping=Shaping("rl_core.worlds.shaping:tip_height")).memory_size
-    3000
+    >>> from rl_core.dqn import DQNConfig
+    >>> DQNConfig(gamma=0.9).optimiser, DQNConfig.report_2018().optimiser
+    ('adam', 'rmsprop')
     """
 
     gamma: float = 0.99
-    network: Network = field(default_factory=partial(MLP, biases=False))
-    optimiser: Literal["rmsprop", "adam"] = "rmsprop"
+    network: Network = field(default_factory=partial(MLP, (64, 64)))
+    optimiser: Literal["rmsprop", "adam"] = "adam"
     learning_rate: float = 1e-3
-    batch_size: int = 512
-    memory_size: int = 3000
-    learning_starts: int = 3000
+    batch_size: int = 64
+    memory_size: int = 50_000
+    learning_starts: int = 1_000
     update_every: int = 1
-    copy_every: int = 300
-    epsilon: Epsilon = field(default_factory=HalfWay)
+    copy_every: int = 500
+    epsilon: Epsilon = field(default_factory=partial(Linear, 1.0, 0.05, steps=10_000))
     persistence: int = 1
     shaping: Shaping | None = None
     bootstrap_through_end: bool = False
@@ -137,6 +155,24 @@ class DQNConfig:
         )
         fields(self, memory_size=(integer, self.batch_size))
         object.__setattr__(self, "engine", check_network(self.network, self.engine))
+
+    @classmethod
+    def report_2018(cls, **changes: Any) -> Self:
+        """Return the report's settings for Acrobot, but with a terminal flag; changed as said.
+
+        Its epsilon moves with the episodes that reach a goal: where every episode ends, as on
+        CartPole, exploration is over before anything is learned.
+        """
+        report: dict[str, Any] = {
+            "network": MLP((10, 20), biases=False),
+            "optimiser": "rmsprop",
+            "batch_size": 512,
+            "memory_size": 3_000,
+            "learning_starts": 3_000,
+            "copy_every": 300,
+            "epsilon": HalfWay(0.9, 0.1),
+        }
+        return cls(**(report | changes))
 
 
 class TorchLearner:
@@ -167,7 +203,8 @@ class TorchLearner:
 
         y = r + gamma max_a' Q(s', a'; theta-), or r if s' is terminal.
         """
-        s, s_next, a, r, end = (torch.from_numpy(array[self.slots]) for array in memory[:5])
+        s, s_next = (torch.from_numpy(scaled(array[self.slots])) for array in memory[:2])
+        a, r, end = (torch.from_numpy(array[self.slots]) for array in memory[2:5])
         with torch.no_grad():
             y = r + self.settings.gamma * self.fixed(s_next).amax(1)
             if not self.settings.through_end:
@@ -210,6 +247,11 @@ def act(learner: Any, observation: NDArray[np.float32], u: float, v: float) -> i
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.dqn import act
+    >>> from rl_core.exploration import schedule_state
+    >>> from rl_core.kernels import q_update
+    >>> from rl_core.kernels.q_update import Settings
     >>> way = Settings(0.9, 2, 1, 1, 10, 3, 1e-3, True, False, 3)  # persistence 3
     >>> theta = np.array([0, 0, 1, 0, 0, 0], np.float32)
     >>> learner = q_update.make_learner((1, 3), theta, way, schedule_state(0.1), biases=False)
@@ -300,11 +342,12 @@ def _make_learner(
 
 def _train(world: World, config: DQNConfig, training: Training) -> None:
     """Train one seed."""
+    _check_memory(config, world)
     streams = spawn_streams(training.seed)
     world.seed(streams.environment_seed)
     learner, arrays = _make_learner(config, world, streams.network)
     training.keep("initial/", arrays())
-    memory = make_memory(config.memory_size, world.n_observations)
+    memory = make_memory(config.memory_size, world.n_observations, as_bytes=world.as_bytes)
     shape = shape_for(config.shaping, world.n_observations)
     rngs = streams.policy, streams.replay
     both = isinstance(world, TaskWorld) and isinstance(learner, Learner)
@@ -333,12 +376,20 @@ def check_dqn(env: EnvironmentLike, config: DQNConfig) -> None:
 
     Examples
     --------
+    >>> from rl_core.dqn import DQNConfig, check_dqn
     >>> check_dqn("MountainCar-v0", DQNConfig())
     """
     instance("config", config, DQNConfig, "a DQNConfig")
     with closing(open_world(env)) as world:
+        _check_memory(config, world)
         _make_learner(config, world, np.random.default_rng(0))
         shape_for(config.shaping, world.n_observations)
+
+
+def _check_memory(config: DQNConfig, world: World) -> None:
+    """Raise if the machine cannot hold the replay memory, of which zeros take no room at first."""
+    each = bytes_a_transition(world.n_observations, as_bytes=world.as_bytes)
+    in_memory("memory_size", config.memory_size, config.memory_size * each)
 
 
 def dqn(
@@ -374,14 +425,16 @@ def dqn(
     ------
     ValueError, TypeError
         If an argument is not as described, the environment unknown or of other spaces, the
-        network's output of another shape, or a shaping not for what is observed or NaN.
+        network's output of another shape, a shaping not for what is observed or NaN, or the memory
+        more than the machine has.
 
     Examples
     --------
+    >>> from rl_core.dqn import DQNConfig, dqn
     >>> config = DQNConfig(batch_size=32, learning_starts=100, max_episode_steps=200)
     >>> run = dqn("MountainCar-v0", config, episodes=2, seeds=[0, 1])
     >>> run.table["steps"].tolist(), run.arrays["layer0.weight"].shape
-    ([200, 200, 200, 200], (2, 2, 10))
+    ([200, 200, 200, 200], (2, 2, 64))
     """
     instance("config", config, DQNConfig, "a DQNConfig")
 
@@ -390,6 +443,5 @@ def dqn(
             _train(world, config, training)
 
     seeds = one_seed_of(env, seeds)
-    return train_seeds(
-        train, episodes=episodes, seeds=seeds, snapshots=snapshots, progress=progress
-    )
+    told: Any = {"progress": progress, "env": env, "config": config}
+    return train_seeds(train, episodes=episodes, seeds=seeds, snapshots=snapshots, **told)

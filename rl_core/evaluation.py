@@ -7,29 +7,54 @@ face the same starts and can be compared pair by pair.
 An agent is a network that puts out preferences for actions, or the mean of a continuous one. One
 whose largest output is followed is no different kind: with probabilities proportional to
 exp(Q / T), the largest value wins as T goes to 0 (Sutton and Barto, 2018, section 13.1). Neither is
-one that acts at random: its preferences are equal. Greedy tables are evaluated likewise.
+one that acts at random: its preferences are equal. A table of action values is an agent too.
 """
 
+import io
+import json
+import math
 from collections.abc import Callable, Mapping
 from contextlib import closing
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
 
+import gymnasium
 import numpy as np
 import pandas as pd
+import torch
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from rl_core import modules
 from rl_core.checks import floats, generator, instance, integer, number, require
+from rl_core.dqn import DQNConfig
+from rl_core.identity import canonical_json, describe, restored
 from rl_core.kernels import likelihood, networks
-from rl_core.kernels.choices import EPSILON_GREEDY, choose
-from rl_core.kernels.compiled import compiled
-from rl_core.kernels.likelihood import Policy
-from rl_core.policies import MLP, Gaussian
+from rl_core.kernels.likelihood import Actor, Policy
+from rl_core.mdp import MDP
+from rl_core.policies import MLP, Categorical, Gaussian, make_policy
+from rl_core.q_learning import QLearningConfig
 from rl_core.reinforce import ReinforceConfig
-from rl_core.worlds.discretise import GriddedTask, start_gridded, step_gridded
-from rl_core.worlds.environments import EnvironmentLike, World, open_world
-from rl_core.worlds.episodes import Trajectory, play_episode
+from rl_core.worlds.discretise import (
+    Grid,
+    GriddedTask,
+    action_levels,
+    make_grid,
+    task_of,
+)
+from rl_core.worlds.environments import (
+    BYTE,
+    EnvironmentLike,
+    GymnasiumWorld,
+    World,
+    open_world,
+    opened,
+)
+from rl_core.worlds.episodes import AnyActor, ModuleActor, TableActor, Trajectory, act, play_episode
+from rl_core.worlds.names import Make, find
+from rl_core.worlds.twins import twin
 
 SPAWN_KEY = (1_000,)
 """Names the streams of evaluation among a seed's; learners use small numbers."""
@@ -50,50 +75,343 @@ Measure = Callable[[NDArray[np.float32], NDArray[np.float32], NDArray[np.float64
 """Observations, actions and rewards of an episode to a number."""
 
 
-class Agent(NamedTuple):
-    """A stochastic policy with its parameters, see `rl_core.kernels.likelihood`.
+Spaces = tuple[spaces.Space[Any], spaces.Space[Any]]
+"""What is observed and what is done."""
+
+FORMAT = "rl_core agent 1"
+
+
+@dataclass(frozen=True)
+class Agent:
+    """Who acts: a policy with its parameters, and what it was made of.
+
+    `rl_core.training.Run.agent` makes one of a seed that was trained, `load` of a file.
 
     Attributes
     ----------
-    policy : Policy
-    parameters : float32 array of shape (P,)
-    epsilon : float
-        Probability of a uniformly random action instead, where actions are discrete.
+    actor : Actor, ModuleActor or TableActor
+        Turns noise into actions, see `rl_core.worlds.episodes.act`.
+    config : dataclass or None
+        Of the run that made it. What `save` keeps, like the next two.
+    weights : mapping of str to array
+        What was learned.
+    spaces : tuple of gymnasium.spaces.Space, or None
+        Of the observations and the actions. None: vectors, and numbers from 0 or vectors.
+    env : str, Make, gymnasium.Env, callable or None
+        What it was trained on.
+    rng : numpy.random.Generator
+        What `predict` and `film` draw from.
     """
 
-    policy: Policy
-    parameters: NDArray[np.float32]
-    epsilon: float = 0.0
+    actor: AnyActor
+    config: Any = None
+    weights: Mapping[str, NDArray[Any]] = field(default_factory=dict, repr=False)
+    spaces: Spaces | None = None
+    env: Any = None
+    rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0), repr=False)
+
+    @cached_property
+    def _greedy(self) -> AnyActor:
+        return greedy(self).actor
+
+    def predict(
+        self,
+        observation: Any,
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = False,
+    ) -> tuple[Any, Any]:
+        """Return an action and the state, with the arguments of Stable-Baselines3's policies.
+
+        Parameters
+        ----------
+        observation : array
+            One observation, or a batch of them, as vectorised environments give.
+        state, episode_start : object
+            Of a policy with a memory. This has none: the state is given back as it came.
+        deterministic : bool
+            Whether to act by what `greedy` says, without noise.
+
+        Returns
+        -------
+        action : numpy.integer or array
+            Or a batch of them. A continuous action as drawn, as in training: not clipped to bounds.
+        state : object
+
+        Raises
+        ------
+        ValueError
+            The observations have another shape.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from rl_core.evaluation import of_values
+        >>> agent = of_values({"layer0.weight": np.array([[1, 2]], np.float32)})
+        >>> agent.predict(np.ones(1)), agent.predict(np.ones((2, 1)))[0]
+        ((np.int64(1), None), array([1, 1]))
+        """
+        actor = self._greedy if deterministic else self.actor
+        policy, n_seen = actor.policy, _observed(actor)
+        shape = (n_seen,) if self.spaces is None else self.spaces[0].shape
+        seen = np.asarray(observation)
+        fits = seen.shape == shape or seen.shape[1:] == shape
+        require(fits, "observation", seen.shape, f"of shape {shape}, or a batch of such")
+        first = seen.reshape(-1, n_seen).astype(np.float32)
+        if (seen if self.spaces is None else self.spaces[0]).dtype == np.uint8:
+            first *= BYTE
+        actions = np.empty((len(first), policy.action_width), np.float32)
+        draw = self.rng.standard_normal if policy.gaussian else self.rng.random
+        for one, action in zip(first, actions, strict=True):
+            actor.noise[:] = draw(actor.noise.size)
+            act(actor, one, actor.noise, action)
+        native = _native(actions, policy, self.spaces)
+        return (native[0] if seen.shape == shape else native), state
+
+    def save(self, path: str | Path) -> None:
+        """Write configuration and weights to one file: arrays and JSON, for `load`.
+
+        Raises
+        ------
+        ValueError
+            The agent is not of a run, so there is no configuration.
+        """
+        require(self.config is not None and self.spaces, "agent", self, "one of a run, to be saved")
+        assert self.spaces is not None
+        env = self.env if isinstance(self.env, str | Make) else None
+        about: dict[str, Any] = {"format": FORMAT, "config": describe(self.config)}
+        about |= {"env": describe(env, "env"), "spaces": []}
+        arrays: dict[str, Any] = {f"weights {name}": array for name, array in self.weights.items()}
+        for space in self.spaces:
+            if isinstance(space, spaces.Discrete):
+                about["spaces"].append({"n": int(space.n), "start": int(space.start)})
+            else:
+                about["spaces"].append({"dtype": str(space.dtype)})
+                arrays |= {f"{len(about['spaces'])} {end}": getattr(space, end) for end in ENDS}
+        buffer = io.BytesIO()
+        np.savez_compressed(buffer, about=np.array(canonical_json(about)), **arrays)
+        Path(path).write_bytes(buffer.getvalue())
+
+    def film(
+        self,
+        path: str | Path,
+        *,
+        env: EnvironmentLike | None = None,
+        seed: int = 0,
+        max_steps: int = 1_000,
+        deterministic: bool = False,
+    ) -> Path:
+        """Play an episode in Gymnasium and write it as a film (mp4).
+
+        Parameters
+        ----------
+        path : str or Path
+        env : optional
+            By default what the agent was trained on. It has to draw itself (`rgb_array`).
+        seed : int
+            Of the environment's `reset`.
+        max_steps : int
+            Where to stop an episode that has not ended.
+        deterministic : bool
+            As for `predict`.
+
+        Raises
+        ------
+        ImportError
+            The extra `render` is not installed.
+        TypeError, ValueError
+            The environment cannot be drawn, or an argument is not as described.
+        """
+        try:
+            import imageio_ffmpeg
+        except ImportError as error:
+            raise ImportError(
+                "a film needs the extra 'render': pip install imageio-ffmpeg pygame"
+            ) from error
+        seed, max_steps = integer("seed", seed), integer("max_steps", max_steps, 1)
+        with closing(_drawn(self.env if env is None else env)) as world:
+            observation, _ = world.reset(seed=seed)
+            pictures: list[Any] = [world.render()]
+            ended = False
+            while not ended and len(pictures) <= max_steps:
+                action, _ = self.predict(observation, deterministic=deterministic)
+                observation, _, terminated, truncated, _ = world.step(action)
+                pictures.append(world.render())
+                ended = terminated or truncated
+            height, width = (side - side % 2 for side in pictures[0].shape[:2])
+            rate = world.metadata.get("render_fps", 30)
+            writer = imageio_ffmpeg.write_frames(
+                str(path), (width, height), fps=rate, macro_block_size=2
+            )
+            writer.send(None)
+            for picture in pictures:
+                writer.send(np.ascontiguousarray(picture[:height, :width]))
+            writer.close()
+        return Path(path)
 
 
-def as_learned(config: ReinforceConfig, weights: Mapping[str, NDArray[np.float32]]) -> Agent:
-    """Return the stochastic policy that REINFORCE has learned.
+ENDS = ("low", "high")
+
+
+def load(path: str | Path, rng: np.random.Generator | None = None) -> Agent:
+    """Return the agent that `Agent.save` wrote to a file.
 
     Parameters
     ----------
-    config : ReinforceConfig
+    path : str or Path
+    rng : numpy.random.Generator, optional
+        What it draws from; by default one of seed 0.
+
+    Raises
+    ------
+    FileNotFoundError
+    ValueError
+        The file is damaged or another, or names a class or network that is not to be found.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from rl_core.evaluation import load
+    >>> from rl_core.reinforce import ReinforceConfig, reinforce
+    >>> run = reinforce("CartPole-v1", ReinforceConfig(), episodes=1, seeds=[0])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     run.agent(seed=0).save(Path(folder) / "agent.npz")
+    ...     agent = load(Path(folder) / "agent.npz")
+    >>> agent.config == ReinforceConfig()
+    True
+    """
+    try:
+        with np.load(io.BytesIO(Path(path).read_bytes()), allow_pickle=False) as file:
+            arrays = dict(file)
+        about = json.loads(str(arrays["about"]))
+        require(about["format"] == FORMAT, "format", about["format"], FORMAT)
+        found: list[spaces.Space[Any]] = []
+        for number_, space in enumerate(about["spaces"], 1):
+            if "n" in space:
+                found.append(spaces.Discrete(space["n"], start=space["start"]))
+            else:
+                bounds = (arrays[f"{number_} {end}"] for end in ENDS)
+                found.append(spaces.Box(*bounds, dtype=np.dtype(space["dtype"]).type))
+        config, env = restored(about["config"]), restored(about["env"])
+        kept = [name for name in arrays if name.startswith("weights ")]
+        weights = {name.partition(" ")[2]: arrays[name] for name in kept}
+        agent = as_learned(config, weights, spaces=(found[0], found[1]), env=env)
+    except FileNotFoundError:
+        raise
+    except Exception as error:  # whatever a damaged file makes of zipfile, numpy and json
+        raise ValueError(
+            f"path must be a file that Agent.save wrote, got {str(path)!r}: {error}"
+        ) from error
+    return agent if rng is None else replace(agent, rng=generator("rng", rng))
+
+
+def spaces_of(env: Any) -> Spaces:
+    """Return what is observed of an environment or model, and what is done in it.
+
+    Examples
+    --------
+    >>> from rl_core.evaluation import spaces_of
+    >>> spaces_of("FrozenLake-v1")
+    (Discrete(16), Discrete(4))
+    """
+    if isinstance(env, MDP):
+        return spaces.Discrete(env.n_states), spaces.Discrete(env.n_actions)
+    if (task := task_of(env)) is not None:
+        return task.observation_space, task.action_space
+    made = opened(env)
+    if made is not env:
+        made.close()
+    return made.observation_space, made.action_space
+
+
+def as_learned(
+    config: Any,
+    weights: Mapping[str, NDArray[Any]],
+    *,
+    spaces: Spaces | None = None,
+    env: Any = None,
+    rng: np.random.Generator | None = None,
+) -> Agent:
+    """Return the policy that was learned, as it acted in the end.
+
+    That of REINFORCE is the stochastic policy itself. DQN's is epsilon-greedy with the last epsilon
+    of its schedule, a random action lasting one step; that of a table with the epsilon of its
+    trials (`QLearningConfig.evaluation`). The configuration of any other algorithm says it by a
+    method `actor(weights, observation_space, action_space)`.
+
+    Parameters
+    ----------
+    config : ReinforceConfig, DQNConfig, QLearningConfig, or one with a method `actor`
         Of the run that made the weights.
     weights : mapping of str to array
         Of one seed, as `rl_core.training.weights_of` gives them.
+    spaces : tuple of gymnasium.spaces.Space, optional
+        Of observations and actions (`spaces_of`); an MLP needs none.
+    env, rng
+        See `Agent`.
 
     Raises
     ------
     TypeError, ValueError
-        `config` is no ReinforceConfig or its network no MLP, or the weights are not of one network,
+        `config` is none of these, or needs spaces, or the weights are not of its network or table,
         or without the `log_sigma` of a Gaussian.
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.evaluation import as_learned
+    >>> from rl_core.policies import MLP
+    >>> from rl_core.reinforce import ReinforceConfig
     >>> weights = {"layer0.weight": np.zeros((2, 3), np.float32)}
-    >>> as_learned(ReinforceConfig(network=MLP(())), weights).policy.sizes
+    >>> as_learned(ReinforceConfig(network=MLP(())), weights).actor.policy.sizes
     array([2, 3])
     """
-    instance("config", config, ReinforceConfig, "a ReinforceConfig")
+    known = isinstance(config, ReinforceConfig | DQNConfig | QLearningConfig)
+    allowed = "a configuration of REINFORCE, DQN or Q-learning, or one with a method `actor`"
+    instance("config", config, object if known or hasattr(config, "actor") else (), allowed)
     instance("weights", weights, Mapping, "a mapping of names to arrays")
-    require(isinstance(config.network, MLP), "network", config.network, "an MLP(...)")
+    actor = _actor(config, weights, spaces)
+    rng = np.random.default_rng(0) if rng is None else generator("rng", rng)
+    return Agent(actor, config, weights, spaces, env, rng)
+
+
+def _actor(config: Any, weights: Mapping[str, NDArray[Any]], spaces: Spaces | None) -> AnyActor:
+    if isinstance(config, ReinforceConfig | DQNConfig) and isinstance(config.network, MLP):
+        return _perceptron_actor(config, weights)
+    if spaces is None:
+        raise ValueError(f"spaces must be given for {config}, got None")
+    if isinstance(config, QLearningConfig):
+        return _table_actor(config, weights, spaces)
+    if not isinstance(config, ReinforceConfig | DQNConfig):
+        made: AnyActor = config.actor(weights, *spaces)
+        return made
+    n_seen = math.prod(spaces[0].shape or (1,))
+    n_actions = int(getattr(spaces[1], "n", 0))
+    n_components = 0 if n_actions else math.prod(spaces[1].shape or (1,))
+    values = isinstance(config, DQNConfig)
+    distribution = Categorical() if isinstance(config, DQNConfig) else config.policy
+    policy = make_policy(distribution, (), n_seen, n_actions, n_components)
+    own = {name: array for name, array in weights.items() if name != "log_sigma"}
+    n_in, n_out = policy.sizes.tolist()
+    module = modules.make_module(config.network, n_in, n_out, np.random.default_rng(0))
+    modules.load_arrays(module, own)
+    log_sigma = torch.tensor(weights.get("log_sigma", np.zeros(0, np.float32)))
+    return ModuleActor(
+        *(policy, module.eval(), log_sigma, np.empty(policy.action_width)),
+        scale=COLD if values else np.float32(1.0),
+        epsilon=_last_epsilon(config) if isinstance(config, DQNConfig) else 0.0,
+    )
+
+
+def _perceptron_actor(
+    config: ReinforceConfig | DQNConfig, weights: Mapping[str, NDArray[Any]]
+) -> AnyActor:
+    if isinstance(config, DQNConfig):
+        return of_values(weights, _last_epsilon(config)).actor
     sizes, network = networks.pack(weights)
     if not isinstance(config.policy, Gaussian):
-        return Agent(Policy(np.array(sizes), False, False, False, 1), network)
+        return likelihood.make_actor(Policy(np.array(sizes), False, False, False, 1), network)
     given = "log_sigma" in weights
     require(given, "weights", sorted(weights), "with 'log_sigma', since the policy is Gaussian")
     log_sigma = weights["log_sigma"]
@@ -104,7 +422,67 @@ def as_learned(config: ReinforceConfig, weights: Mapping[str, NDArray[np.float32
         config.policy.constant_feature,
         len(log_sigma),
     )
-    return Agent(policy, np.append(network, log_sigma).astype(np.float32))
+    return likelihood.make_actor(policy, np.append(network, log_sigma).astype(np.float32))
+
+
+def _last_epsilon(config: DQNConfig) -> float:
+    epsilon: Any = config.epsilon
+    return float(getattr(epsilon, "end", epsilon))
+
+
+def _table_actor(
+    config: QLearningConfig, weights: Mapping[str, NDArray[Any]], found: Spaces
+) -> TableActor:
+    seen, done = found
+    if isinstance(seen, spaces.Discrete):
+        n, first = int(seen.n), float(seen.start) - 0.5
+        require(n <= 2**24, "spaces", seen, "of at most 2**24 states, which float32 can count")
+        grid = Grid(np.array([first]), np.array([first + n]), np.array([n]))
+    else:
+        require(config.bins, "bins", config.bins, f"given for observations of {seen}")
+        assert config.bins is not None
+        grid = make_grid(seen, config.bins)
+    epsilon = config.evaluation.epsilon
+    return _look_up(weights["Q"], grid, action_levels(done, config.levels), epsilon)
+
+
+def _look_up(Q: Any, grid: Grid, actions: NDArray[np.float32], epsilon: float) -> TableActor:
+    Q = floats("Q", Q, (grid.n_cells, len(actions)), finite=False)
+    sizes = np.array([len(grid.bins), len(actions)])
+    policy = Policy(sizes, False, False, False, actions.shape[1])
+    epsilon = number("epsilon", epsilon, 0, 1)
+    return TableActor(policy, grid, Q, actions, epsilon, np.empty(2))
+
+
+def of_table(world: GriddedTask, Q: NDArray[np.float64], epsilon: float = 0.0) -> Agent:
+    """Return the epsilon-greedy policy of a table over the cells of a gridded task.
+
+    Parameters
+    ----------
+    world : GriddedTask
+        See `rl_core.worlds.discretise.gridded`.
+    Q : float64 array of shape `world.shape`
+        Action values, without NaN. Of several largest ones, one is drawn.
+    epsilon : float
+
+    Raises
+    ------
+    TypeError, ValueError
+        If an argument is not as described.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rl_core.evaluation import evaluate, of_table
+    >>> from rl_core.worlds.discretise import gridded
+    >>> world = gridded("MountainCar-v0", 10)
+    >>> agent = of_table(world, np.zeros(world.shape))
+    >>> table = evaluate("MountainCar-v0", agent, seed=0, episodes=1, max_steps=9)
+    >>> table["steps"].item(), table["terminated"].item()
+    (9, False)
+    """
+    instance("world", world, GriddedTask, "a GriddedTask (rl_core.worlds.discretise.gridded)")
+    return Agent(_look_up(Q, world.grid, world.actions, epsilon))
 
 
 def of_values(weights: Mapping[str, NDArray[np.float32]], epsilon: float = 0.0) -> Agent:
@@ -112,35 +490,52 @@ def of_values(weights: Mapping[str, NDArray[np.float32]], epsilon: float = 0.0) 
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.evaluation import COLD, of_values
     >>> agent = of_values({"layer0.weight": np.array([[1, 2]], np.float32)})
-    >>> agent.parameters[:2] / COLD
+    >>> agent.actor.parameters[:2] / COLD
     array([1., 2.], dtype=float32)
     """
     sizes, parameters = networks.pack(weights)
-    agent = greedy(Agent(Policy(np.array(sizes), False, False, False, 1), parameters))
-    return agent._replace(epsilon=number("epsilon", epsilon, 0, 1))
+    epsilon = number("epsilon", epsilon, 0, 1)
+    actor = likelihood.make_actor(Policy(np.array(sizes), False, False, False, 1), parameters)
+    return Agent(_cold(actor)._replace(epsilon=epsilon))
 
 
 def greedy(agent: Agent) -> Agent:
     """Return the agent that does what another most likely does: argmax of pi, or mu.
 
-    Discrete actions: the last layer is divided by a temperature of 2^-40. Of several equal outputs,
-    one is drawn. Continuous actions: sigma is 0.
+    Discrete actions: preferences are divided by a temperature of 2^-40, and epsilon is 0. Of
+    several equal outputs, one is drawn. Continuous actions: sigma is 0.
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.evaluation import Agent, COLD, greedy
+    >>> from rl_core.kernels import likelihood
+    >>> from rl_core.kernels.likelihood import Policy
     >>> policy = Policy(np.array([1, 2]), False, False, False, 1)
-    >>> greedy(Agent(policy, np.array([1, 2, 0, 0], np.float32))).parameters / COLD
+    >>> agent = Agent(likelihood.make_actor(policy, np.array([1, 2, 0, 0], np.float32)))
+    >>> greedy(agent).actor.parameters / COLD
     array([1., 2., 0., 0.], dtype=float32)
     """
-    instance("agent", agent, Agent, "an Agent")
-    policy, parameters = agent.policy, agent.parameters.copy()
+    actor = instance("agent", agent, Agent, "an Agent").actor
+    if isinstance(actor, ModuleActor):
+        still = torch.full_like(actor.log_sigma, -math.inf)
+        return replace(agent, actor=actor._replace(log_sigma=still, scale=COLD, epsilon=0.0))
+    if isinstance(actor, Actor):
+        actor = _cold(actor)
+    return replace(agent, actor=actor._replace(epsilon=0.0))
+
+
+def _cold(actor: Actor) -> Actor:
+    policy, parameters = actor.policy, actor.parameters.copy()
     if policy.gaussian:
         parameters[parameters.size - policy.action_width :] = -np.inf
     else:
         inputs, outputs = policy.sizes[-2:]
         parameters[parameters.size - (inputs + 1) * outputs :] *= COLD
-    return Agent(policy, parameters)
+    return actor._replace(parameters=parameters)
 
 
 def uniform(n_observations: int, n_actions: int) -> Agent:
@@ -148,13 +543,15 @@ def uniform(n_observations: int, n_actions: int) -> Agent:
 
     Examples
     --------
-    >>> uniform(6, 3).parameters.any()
+    >>> from rl_core.evaluation import uniform
+    >>> uniform(6, 3).actor.parameters.any()
     np.False_
     """
     n_observations = integer("n_observations", n_observations, 1)
     n_actions = integer("n_actions", n_actions, 1)
     policy = Policy(np.array([n_observations, n_actions]), False, False, False, 1)
-    return Agent(policy, np.zeros((n_observations + 1) * n_actions, np.float32))
+    zeros = np.zeros((n_observations + 1) * n_actions, np.float32)
+    return Agent(likelihood.make_actor(policy, zeros))
 
 
 def evaluation_streams(seed: int) -> tuple[int, np.random.Generator]:
@@ -162,6 +559,7 @@ def evaluation_streams(seed: int) -> tuple[int, np.random.Generator]:
 
     Examples
     --------
+    >>> from rl_core.evaluation import evaluation_streams
     >>> evaluation_streams(0)[0] == evaluation_streams(1)[0]
     False
     """
@@ -216,22 +614,20 @@ def evaluate(
 
     Examples
     --------
+    >>> from rl_core.evaluation import evaluate, uniform
     >>> table = evaluate("MountainCar-v0", uniform(2, 3), seed=0, episodes=2, max_steps=50)
     >>> table["return"].tolist(), table["terminated"].tolist()
     ([-50.0, -50.0], [False, False])
     """
     seed, episodes, max_steps, limit = _checked(seed, episodes, max_steps, limit)
-    instance("agent", agent, Agent, "an Agent")
     measures = _checked_measures(measures)
     environment_seed, rng = evaluation_streams(seed)
-    with closing(open_world(env)) as world:
-        check_fit(agent, world)
+    with closing(_opened(env, agent)) as world:
         world.seed(environment_seed)
-        actor = likelihood.make_actor(*agent)
-        trajectory = Trajectory(world.n_observations, agent.policy.action_width)
+        trajectory = Trajectory(world.n_observations, agent.actor.policy.action_width)
         rows = []
         for _ in range(episodes):
-            steps, terminated = play_episode(world, actor, rng, max_steps, trajectory)
+            steps, terminated = play_episode(world, agent.actor, rng, max_steps, trajectory)
             _, actions, rewards = trajectory.first(steps)
             row = {"steps": steps, "return": rewards.sum(), "terminated": terminated}
             row["limited_return"] = rewards[: limit or max_steps].sum()
@@ -239,55 +635,6 @@ def evaluate(
                 row[name] = measure(trajectory.observations[: steps + 1], actions, rewards)
             rows.append(row)
     return _table(pd.DataFrame(rows), limit)
-
-
-def evaluate_table(
-    world: GriddedTask,
-    Q: NDArray[np.float64],
-    *,
-    seed: int,
-    episodes: int,
-    max_steps: int,
-    limit: int | None = None,
-) -> pd.DataFrame:
-    """Play episodes with the greedy policy of a table, from the starts of `evaluate`.
-
-    Parameters
-    ----------
-    world : GriddedTask
-        See `rl_core.worlds.discretise.gridded`.
-    Q : float64 array of shape `world.shape`
-        Action values, without NaN. Of several largest ones, one is drawn.
-    seed, episodes, max_steps, limit
-        As for `evaluate`.
-
-    Returns
-    -------
-    pandas.DataFrame
-        As `evaluate` returns it.
-
-    Raises
-    ------
-    ValueError
-        If an argument is out of range, or Q is no array of the world's shape or has a NaN.
-
-    Examples
-    --------
-    >>> from rl_core.worlds.discretise import gridded
-    >>> world = gridded("MountainCar-v0", 10)
-    >>> table = evaluate_table(world, np.zeros(world.shape), seed=0, episodes=1, max_steps=9)
-    >>> table["steps"].item(), table["terminated"].item()
-    (9, False)
-    """
-    seed, episodes, max_steps, limit = _checked(seed, episodes, max_steps, limit)
-    instance("world", world, GriddedTask, "a GriddedTask (rl_core.worlds.discretise.gridded)")
-    Q = floats("Q", Q, world.shape, finite=False)
-    environment_seed, rng = evaluation_streams(seed)
-    starts = np.random.default_rng(environment_seed)
-    played = np.empty((episodes, 4))
-    _play_table(world, Q, starts, rng, max_steps, limit or max_steps, played)
-    table = pd.DataFrame(played, columns=["steps", "return", "terminated", "limited_return"])
-    return _table(table.astype({"steps": int, "terminated": bool}), limit)
 
 
 def _table(table: pd.DataFrame, limit: int | None) -> pd.DataFrame:
@@ -298,30 +645,6 @@ def _table(table: pd.DataFrame, limit: int | None) -> pd.DataFrame:
     table["limited_steps"] = table["steps"].clip(upper=limit)
     table["limited_terminated"] = table["terminated"] & (table["steps"] <= limit)
     return table
-
-
-@compiled
-def _play_table(
-    world: GriddedTask,
-    Q: NDArray[np.float64],
-    starts: np.random.Generator,
-    rng: np.random.Generator,
-    max_steps: int,
-    limit: int,
-    played: NDArray[np.float64],
-) -> None:
-    """Write steps, return, end and limited return of every episode."""
-    for k in range(len(played)):
-        s = start_gridded(world, starts)
-        steps, total, limited, terminated = 0, 0.0, 0.0, False
-        while steps < max_steps and not terminated:
-            a = choose(EPSILON_GREEDY, 0.0, Q[s], rng.random(), rng.random())
-            s, reward, terminated = step_gridded(world, a)
-            total += reward
-            limited += reward if steps < limit else 0.0
-            steps += 1
-        played[k, 0], played[k, 1] = steps, total
-        played[k, 2], played[k, 3] = 1.0 if terminated else 0.0, limited
 
 
 def _checked_measures(measures: Mapping[str, Measure] | None) -> Mapping[str, Measure]:
@@ -354,29 +677,95 @@ def check_fit(agent: Agent, world: World) -> None:
 
     Examples
     --------
+    >>> from rl_core.evaluation import check_fit, uniform
+    >>> from rl_core.worlds.environments import open_world
     >>> check_fit(uniform(2, 5), open_world("MountainCar-v0"))
     Traceback (most recent call last):
     ValueError: agent must be a categorical policy of 3 actions, got a categorical policy of 5
     """
     instance("agent", agent, Agent, "an Agent")
     instance("world", world, World, "a world that was opened")
-    policy, parameters, _ = agent
+    actor, policy = agent.actor, agent.actor.policy
     inputs = world.n_observations + policy.constant_feature
     sizes = policy.sizes.tolist()
-    require(sizes[0] == inputs, "agent", sizes, f"a network of {inputs} inputs")
+    what = "a table over" if isinstance(actor, TableActor) else "a network of"
+    require(sizes[0] == inputs, "agent", sizes, f"{what} {inputs} inputs")
+    width, kind = policy.action_width, "Gaussian" if policy.gaussian else "categorical"
     if world.n_actions > 0:
         allowed = f"a categorical policy of {world.n_actions} actions"
         fits = not policy.gaussian and sizes[-1] == world.n_actions
     else:
         allowed = f"a Gaussian policy of {world.action_dimensions} components"
-        fits = policy.gaussian and policy.action_width == world.action_dimensions
+        fits = policy.gaussian or isinstance(actor, TableActor)
+        fits = fits and width == world.action_dimensions
     if not fits:
-        kind = "Gaussian" if policy.gaussian else "categorical"
-        width = policy.action_width if policy.gaussian else sizes[-1]
-        raise ValueError(f"agent must be {allowed}, got a {kind} policy of {width}")
-    count = networks.count_parameters(sizes) + policy.gaussian * policy.action_width
-    shape = np.shape(parameters)
-    require(shape == (count,), "agent", shape, f"a policy with parameters of shape ({count},)")
+        raise ValueError(
+            f"agent must be {allowed}, got a {kind} policy of "
+            f"{width if policy.gaussian else sizes[-1]}"
+        )
+    if isinstance(actor, Actor):
+        count, shape = networks.count_parameters(sizes), np.shape(actor.parameters)
+        count += policy.gaussian * width
+        require(shape == (count,), "agent", shape, f"a policy with parameters of shape ({count},)")
+
+
+def _opened(env: EnvironmentLike, agent: Agent) -> World:
+    """Open a world for an agent that fits it; states that have a number are seen as that number."""
+    instance("agent", agent, Agent, "an Agent")
+    world: World | None = None
+    if isinstance(agent.actor, TableActor) and task_of(env) is None:
+        made = opened(env)
+        if isinstance(made.observation_space, spaces.Discrete):
+            seen = spaces.Box(-np.inf, np.inf, (1,))
+            numbers = gymnasium.wrappers.TransformObservation(
+                made, lambda s: np.array([s], np.float32), seen
+            )
+            world = GymnasiumWorld(numbers, owned=made is not env)
+        elif made is not env:
+            made.close()
+    world = open_world(env) if world is None else world
+    check_fit(agent, world)
+    return world
+
+
+def _observed(actor: AnyActor) -> int:
+    """Return how many numbers an actor sees."""
+    return int(actor.policy.sizes[0]) - actor.policy.constant_feature
+
+
+def _native(actions: NDArray[np.float32], policy: Policy, found: Spaces | None) -> Any:
+    """Return actions as their environment takes them."""
+    done = None if found is None else found[1]
+    if isinstance(done, spaces.Box):
+        return actions.astype(done.dtype).reshape(-1, *done.shape)
+    if policy.gaussian:
+        return actions
+    return actions[:, 0].astype(np.int64) + int(getattr(done, "start", 0))
+
+
+def _drawn(env: Any) -> gymnasium.Env[Any, Any]:
+    """Open an environment that draws itself, with the time limit that it is played with here."""
+    found = find(env) if isinstance(env, str) else env
+    picture: dict[str, Any] = {"render_mode": "rgb_array"}
+    if isinstance(env, str) and found is None:
+        task = twin(env)
+        limit: dict[str, Any] = (
+            {} if task is None else {"max_episode_steps": task.max_episode_steps or -1}
+        )
+        made: Any = gymnasium.make(env, **picture, **limit)
+    elif isinstance(env, Make):
+        made = gymnasium.make(env.id, **{**env.arguments, **picture})
+    elif callable(found) and not isinstance(found, gymnasium.Env):
+        try:
+            made = found(**picture)
+        except TypeError:  # it takes no arguments
+            made = found()
+    else:
+        made = found
+    draws = isinstance(made, gymnasium.Env) and made.render_mode == "rgb_array"
+    require(draws, "env", env, "an environment of Gymnasium's with render_mode='rgb_array'")
+    film: gymnasium.Env[Any, Any] = made
+    return film
 
 
 @dataclass(frozen=True)
@@ -428,19 +817,18 @@ def rollout(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.evaluation import rollout, uniform
     >>> episode = rollout("MountainCar-v0", uniform(2, 3), np.random.default_rng(0), 100)
     >>> episode.observations.shape, episode.terminated
     ((101, 2), False)
     """
-    instance("agent", agent, Agent, "an Agent")
     max_steps, rng = integer("max_steps", max_steps, 1), generator("rng", rng)
     environment_seed = int(rng.integers(2**32))
-    with closing(open_world(env)) as world:
-        check_fit(agent, world)
+    with closing(_opened(env, agent)) as world:
         world.seed(environment_seed)
-        trajectory = Trajectory(world.n_observations, agent.policy.action_width)
-        actor = likelihood.make_actor(*agent)
-        steps, terminated = play_episode(world, actor, rng, max_steps, trajectory)
+        trajectory = Trajectory(world.n_observations, agent.actor.policy.action_width)
+        steps, terminated = play_episode(world, agent.actor, rng, max_steps, trajectory)
     return Rollout(
         trajectory.observations[: steps + 1],
         trajectory.actions[:steps],
@@ -472,6 +860,8 @@ def action_values(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.evaluation import action_values
     >>> weights = {"layer0.weight": np.array([[1, 2, 3], [0, 0, 10]], np.float32)}
     >>> action_values(weights, np.array([[1.0, 1.0]]))
     array([[ 1.,  2., 13.]], dtype=float32)
@@ -508,6 +898,10 @@ def mean_actions(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.evaluation import mean_actions
+    >>> from rl_core.policies import Gaussian, MLP
+    >>> from rl_core.reinforce import ReinforceConfig
     >>> config = ReinforceConfig(network=MLP(()), policy=Gaussian(mean="direct"))
     >>> weights = {"layer0.weight": np.array([[1], [2]]), "log_sigma": np.zeros(1)}
     >>> mean_actions(config, weights, np.array([[1.0, 10.0]]))
@@ -515,7 +909,9 @@ def mean_actions(
     """
     instance("config", config, ReinforceConfig, "a ReinforceConfig")
     require(isinstance(config.policy, Gaussian), "policy", config.policy, "Gaussian(...)")
-    policy, parameters, _ = as_learned(config, weights)
+    actor = as_learned(config, weights).actor
+    assert isinstance(actor, Actor)
+    policy, parameters = actor.policy, actor.parameters
     width = int(policy.sizes[0]) - policy.constant_feature
     features = floats("observations", observations, (None, width)).astype(np.float32)
     if policy.constant_feature:
@@ -552,6 +948,9 @@ def state_grid(space: spaces.Box, points: int) -> NDArray[np.float32]:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from gymnasium import spaces
+    >>> from rl_core.evaluation import state_grid
     >>> space = spaces.Box(np.array([0, -1], np.float32), np.array([1, 1], np.float32))
     >>> state_grid(space, 2).tolist()
     [[0.0, -1.0], [0.0, 1.0], [1.0, -1.0], [1.0, 1.0]]

@@ -54,6 +54,7 @@ def import_path(name: str, thing: object, allowed: str = "a class or function") 
 
     Examples
     --------
+    >>> from rl_core.identity import canonical_json
     >>> from rl_core.identity import import_path
     >>> import_path("rule", canonical_json)
     'rl_core.identity:canonical_json'
@@ -131,6 +132,38 @@ def _place(name: str, thing: object, modules: set[str] | None) -> tuple[str, str
     return module, colon, path
 
 
+def restored(described: Any) -> Any:
+    """Return the value that `describe` described; lists come back as tuples.
+
+    Raises
+    ------
+    TypeError, ValueError
+        A class or function is not found there, or does not take the values.
+
+    Examples
+    --------
+    >>> from rl_core.identity import describe, restored
+    >>> from rl_core.training import Failure
+    >>> restored(describe(Failure(seed=3, episode=1, reason="NaN")))
+    Failure(seed=3, episode=1, reason='NaN')
+    """
+    if isinstance(described, list):
+        return tuple(restored(item) for item in described)
+    if not isinstance(described, dict):
+        return described
+    if "class" in described:
+        kind = imported("config", f"{described['from']}:{described['class']}")
+        if not (isinstance(kind, type) and dataclasses.is_dataclass(kind)):
+            raise TypeError(f"config must be described by dataclasses, got {kind!r}")
+        given = [field.name for field in dataclasses.fields(kind) if field.init]
+        return kind(**{name: restored(described[name]) for name in given})
+    if "import" in described:
+        return imported("config", f"{described['from']}:{described['import']}")
+    if "float" in described:
+        return float(described["float"])
+    return {name: restored(item) for name, item in described.items()}
+
+
 def imported(name: str, path: object) -> Any:
     """Return what stands at the import path "module:attribute".
 
@@ -141,6 +174,7 @@ def imported(name: str, path: object) -> Any:
 
     Examples
     --------
+    >>> from rl_core.identity import imported
     >>> imported("shaping", "math:floor")(2.5)
     2
     >>> imported("shaping", "math:flour")
@@ -171,6 +205,7 @@ def code_behind(path: str) -> str:
 
     Examples
     --------
+    >>> from rl_core.identity import code_behind
     >>> len(code_behind("rl_core.maze:Maze"))
     64
     """

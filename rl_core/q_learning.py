@@ -65,8 +65,7 @@ class QLearningConfig:
     exploration : EpsilonGreedy or Softmax or UnnormalisedSoftmax
         How actions are chosen while learning.
     max_steps : int or None
-        Cap on the length of an episode. None: only the environment's own. A rule that never gets
-        to an end then never returns.
+        Cap on the length of an episode. None: only the environment's own, and the budget.
     max_env_steps : int or None
         Budget of environment steps a seed. The episode in which it is used up is stopped there and
         is the seed's last. None: no limit.
@@ -92,7 +91,7 @@ class QLearningConfig:
     step_size: float | Schedule | VisitDecay = 0.2
     exploration: ExplorationRule = field(default_factory=EpsilonGreedy)
     max_steps: int | None = None
-    max_env_steps: int | None = None
+    max_env_steps: int | None = 10_000_000
     evaluation: Trials = field(default_factory=Trials)
     bins: int | tuple[int, ...] | None = None
     levels: int | None = None
@@ -200,6 +199,7 @@ def q_learning(
     if progress is not None:
         checks.instance("progress", progress, Callable, "a function of episodes and steps, or None")
     with _opened(env, config) as (_, model, shape):
+        _check_memory(config, shape, len(seeds) * (1 + len(at)))
         yardstick = make_yardstick(model, Q_star, shape)
     task, record = _task(config, episodes), appraisal.empty_record(len(seeds), episodes)
     arrays, failures = _empty_arrays(len(seeds), len(at), shape), []
@@ -210,7 +210,7 @@ def q_learning(
         failures += [] if failure is None else [failure]
         if progress is not None:
             progress((i + 1) * episodes, appraisal.env_steps(record))
-    return Run(appraisal.as_table(record, seeds), arrays, tuple(failures))
+    return Run(appraisal.as_table(record, seeds), arrays, tuple(failures), env, config)
 
 
 def check_q_learning(env: object, config: object) -> None:
@@ -229,8 +229,14 @@ def check_q_learning(env: object, config: object) -> None:
     >>> check_q_learning("MountainCar-v0", QLearningConfig(bins=10))
     """
     checks.instance("config", config, QLearningConfig, "a QLearningConfig")
-    with _opened(env, config):
-        pass
+    assert isinstance(config, QLearningConfig)
+    with _opened(env, config) as (_, _, shape):
+        _check_memory(config, shape, 1)
+
+
+def _check_memory(config: QLearningConfig, shape: tuple[int, int], tables: int) -> None:
+    """Raise if the machine cannot hold so many tables of values and of visits."""
+    checks.in_memory("bins", config.bins, 16 * shape[0] * shape[1] * tables)
 
 
 def q_learning_on_model(

@@ -26,7 +26,7 @@ from collections.abc import Callable, Iterable
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import torch
@@ -245,7 +245,8 @@ def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator)
             sigma = {"log_sigma": log_sigma.detach().numpy()} if policy.gaussian else {}
             return {**modules.as_arrays(module), **sigma}
 
-        return _Agent(ModuleActor(policy, module, log_sigma), learner.learn, by_name)
+        actor = ModuleActor(policy, module, log_sigma, np.empty(policy.action_width))
+        return _Agent(actor, learner.learn, by_name)
     biases = config.network.biases
     parameters = policies.initial_parameters(policy, config.policy, rng)
 
@@ -371,6 +372,5 @@ def reinforce(
             _train(world, config, training)
 
     seeds = one_seed_of(env, seeds)
-    return train_seeds(
-        train, episodes=episodes, seeds=seeds, snapshots=snapshots, progress=progress
-    )
+    told: Any = {"progress": progress, "env": env, "config": config}
+    return train_seeds(train, episodes=episodes, seeds=seeds, snapshots=snapshots, **told)

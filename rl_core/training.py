@@ -1,5 +1,6 @@
 """What the learners share: streams of random numbers, the loop over seeds, tables and failures."""
 
+import importlib
 import math
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -53,11 +54,47 @@ class Run:
         the seeds asked for.
     failures : tuple of Failure
         Seeds that diverged. Their rows up to the failure stay in `table`.
+    env, config : object
+        What was trained on, and with.
     """
 
     table: pd.DataFrame
     arrays: dict[str, np.ndarray] = field(default_factory=dict)
     failures: tuple[Failure, ...] = ()
+    env: Any = None
+    config: Any = None
+
+    def agent(self, seed: int, moment: str = "", rng: np.random.Generator | None = None) -> Any:
+        """Return what a seed has learned, as an `rl_core.evaluation.Agent`.
+
+        Parameters
+        ----------
+        seed : int
+            One of those trained.
+        moment : str
+            As for `weights_of`: "" for the last weights.
+        rng : numpy.random.Generator, optional
+            What the agent draws from; by default one of seed 0.
+
+        Raises
+        ------
+        TypeError, ValueError
+            There is no such seed or moment, or the run does not say what it was trained with.
+
+        Examples
+        --------
+        >>> from rl_core.reinforce import ReinforceConfig, reinforce
+        >>> run = reinforce("CartPole-v1", ReinforceConfig(), episodes=1, seeds=[0])
+        >>> agent = run.agent(seed=0)
+        >>> action, _ = agent.predict([0.0, 0.0, 0.1, 0.0])
+        """
+        seeds = self.table["seed"].unique().tolist()
+        require(seed in seeds, "seed", seed, f"one of {seeds}")
+        weights = weights_of(self.arrays, seeds.index(seed), moment)
+        # By name, since an import would make what plays episodes a part of what trains (`sources`).
+        evaluation = importlib.import_module("rl_core.evaluation")
+        spaces = None if self.env is None else evaluation.spaces_of(self.env)
+        return evaluation.as_learned(self.config, weights, spaces=spaces, env=self.env, rng=rng)
 
 
 class Streams(NamedTuple):
@@ -86,6 +123,7 @@ def spawn_streams(seed: int) -> Streams:
 
     Examples
     --------
+    >>> from rl_core.training import spawn_streams
     >>> bool(spawn_streams(0).policy.random() == spawn_streams(0).policy.random())
     True
     >>> bool(spawn_streams(0).policy.random() == spawn_streams(1).policy.random())
@@ -111,6 +149,7 @@ class Training:
 
     Examples
     --------
+    >>> from rl_core.training import Training
     >>> training = Training(seed=0, episodes=3, snapshots=(), report=lambda episodes, steps: None)
     >>> for episode in training.course(max_env_steps=25):
     ...     training.add(steps=10, total=-10.0, terminated=True)
@@ -186,6 +225,8 @@ def train_seeds(
     seeds: Any,
     snapshots: Any = (),
     progress: Progress | None = None,
+    env: Any = None,
+    config: Any = None,
 ) -> Run:
     """Train one seed after the other; they share nothing.
 
@@ -202,6 +243,8 @@ def train_seeds(
     progress : callable, optional
         Called now and then with the episodes and environment steps done, over all seeds. A seed
         that ended early counts with all its episodes.
+    env, config : object
+        For the `Run`, so that it can make agents.
 
     Raises
     ------
@@ -210,6 +253,8 @@ def train_seeds(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.training import train_seeds
     >>> def train(training):
     ...     for _ in training.course(None):
     ...         training.add(steps=7, total=1.0, terminated=True)
@@ -244,6 +289,8 @@ def train_seeds(
         pd.concat([one.table() for one in done], ignore_index=True),
         _stacked([one.arrays(snapshots) for one in done]),
         tuple(one.failure for one in done if one.failure is not None),
+        env,
+        config,
     )
 
 
@@ -277,6 +324,8 @@ def weights_of(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.training import weights_of
     >>> arrays = {f"{moment}layer0.weight": np.zeros((30, 2, 3)) for moment in ("", "initial/")}
     >>> weights_of(arrays, 0, "initial/")["layer0.weight"].shape
     (2, 3)

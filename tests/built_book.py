@@ -45,7 +45,7 @@ def shown_verdicts(page):
 
 
 def test_there_is_a_book():
-    assert len(CHAPTERS) == 6
+    assert len(CHAPTERS) == 7
 
 
 def test_every_claim_of_the_report_is_judged_once(claims):

@@ -1,5 +1,9 @@
 """What is copied for a preview and for a chapter alone."""
 
+import subprocess
+import sys
+
+import announce
 import build
 import pytest
 import yaml
@@ -36,13 +40,41 @@ def test_a_chapter_alone_has_the_results_of_the_book(root):
 
 @pytest.mark.parametrize("what", ["book", "preview"])
 def test_more_cores_do_not_take_longer(what):
-    times = [build.expected(what, cores) for cores in (1, 2, 4, 16)]
+    times = [announce.expected(what, cores) for cores in (1, 2, 4, 16)]
     assert times == sorted(times, reverse=True)
     assert times[-1] >= 1
 
 
 def test_what_comes_is_said_first(capsys):
-    build.announce(30)
+    announce.announce(30)
     said = capsys.readouterr().out
     assert "minutes" in said
     assert "make book SEEDS=3" in said
+
+
+def test_it_is_said_by_any_python_before_there_is_an_environment():
+    command = [sys.executable, "-S", "-I", announce.__file__]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert "make book SEEDS=3" in said
+
+
+def test_the_whole_book_has_a_progress(capfd):
+    lines = "x.ipynb: Executing notebook using local CWD [mystnb]", "something else"
+    code = f"print({lines[0]!r}); print({lines[1]!r}); print({lines[0]!r}); raise SystemExit(3)"
+    assert build.run([sys.executable, "-c", code], 11) == 3
+    said = capfd.readouterr().out
+    assert "something else" in said
+    assert "notebook 1 of 11" in said
+    assert "notebook 2 of 11" in said
+
+
+@pytest.mark.parametrize(("seeds", "only", "offered"), [("30", [], True), ("3", [], False)])
+def test_an_interrupted_build_offers_the_preview(monkeypatch, capsys, seeds, only, offered):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(build, "build", interrupted)
+    monkeypatch.setattr(sys, "argv", ["build.py"])
+    monkeypatch.setenv("SEEDS", seeds)
+    assert build.main() == 130
+    assert ("make book SEEDS=3" in capsys.readouterr().out) == offered

@@ -59,7 +59,8 @@ def through_torch(actor):
     policy, parameters = actor.policy, actor.parameters
     module = modules.perceptron(policy.sizes.tolist(), parameters)
     sigmas = policy.action_width if policy.gaussian else 0
-    return ModuleActor(policy, module, torch.from_numpy(parameters[parameters.size - sigmas :]))
+    log_sigma = torch.from_numpy(parameters[parameters.size - sigmas :])
+    return ModuleActor(policy, module, log_sigma, actor.noise)
 
 
 def episode(world, actor, rng, max_steps, capacity=4096):

@@ -11,17 +11,17 @@ from rl_core.evaluation import (
     action_values,
     as_learned,
     evaluate,
-    evaluate_table,
     evaluation_streams,
     greedy,
     mean_actions,
+    of_table,
     of_values,
     rollout,
     state_grid,
     uniform,
 )
 from rl_core.kernels import networks
-from rl_core.kernels.likelihood import Policy
+from rl_core.kernels.likelihood import Policy, make_actor
 from rl_core.policies import MLP, Gaussian, Module
 from rl_core.reinforce import ReinforceConfig, reinforce
 from rl_core.training import spawn_streams, weights_of
@@ -78,7 +78,8 @@ def test_a_table_is_evaluated_from_the_starts_of_the_networks():
     """A grid that tells left from right in velocity only holds the same policy as the network."""
     world = gridded("MountainCar-v0", (1, 2))
     Q = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    found = evaluate_table(world, Q, seed=3, episodes=10, max_steps=10_000)
+    table = of_table(world, Q)
+    found = evaluate("MountainCar-v0", table, seed=3, episodes=10, max_steps=10_000)
     network = evaluate("MountainCar-v0", of_values(PUMP), seed=3, episodes=10, max_steps=10_000)
     assert found["terminated"].all()
     np.testing.assert_array_equal(found["steps"], network["steps"])
@@ -118,10 +119,11 @@ def test_same_seed_same_bits_and_a_cap():
 def test_greedy_is_the_mode_of_the_policy():
     policy = Policy(np.array([2, 3]), False, False, False, 1)
     rng = np.random.default_rng(0)
-    agent = Agent(policy, rng.normal(size=9).astype(np.float32))
+    agent = Agent(make_actor(policy, rng.normal(size=9).astype(np.float32)))
 
     def modes(observations, actions, rewards):
-        scores = observations[:-1] @ agent.parameters[:6].reshape(2, 3) + agent.parameters[6:]
+        parameters = agent.actor.parameters
+        scores = observations[:-1] @ parameters[:6].reshape(2, 3) + parameters[6:]
         return float((scores.argmax(axis=1) == actions[:, 0]).mean())
 
     shares = [
@@ -156,7 +158,8 @@ def test_any_other_environment():
 
 
 def test_under_a_limit_the_same_episodes_are_cut():
-    world = gridded("MountainCarContinuous-v0", (1, 2), levels=3)
+    name = "MountainCarContinuous-v0"
+    world = gridded(name, (1, 2), levels=3)
     Q = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     network = {"layer0.weight": np.array([[0], [50]]), "log_sigma": np.array([-3])}
     agent = as_learned(
@@ -164,8 +167,8 @@ def test_under_a_limit_the_same_episodes_are_cut():
         {name: array.astype(np.float32) for name, array in network.items()},
     )
     for play in (
-        lambda **cut: evaluate_table(world, Q, seed=0, episodes=30, **cut),
-        lambda **cut: evaluate("MountainCarContinuous-v0", agent, seed=0, episodes=30, **cut),
+        lambda **cut: evaluate(name, of_table(world, Q), seed=0, episodes=30, **cut),
+        lambda **cut: evaluate(name, agent, seed=0, episodes=30, **cut),
     ):
         long = play(max_steps=10_000, limit=106)
         assert long["terminated"].all()
@@ -186,9 +189,6 @@ def test_bad_arguments():
         arguments = {"seed": 0, "episodes": 1, "max_steps": 5} | bad
         with pytest.raises((TypeError, ValueError), match=f"^{next(iter(bad))} must be .*, got "):
             evaluate("MountainCar-v0", agent, **arguments)
-        world = gridded("MountainCar-v0", 5)
-        with pytest.raises((TypeError, ValueError), match=f"^{next(iter(bad))} must be .*, got "):
-            evaluate_table(world, np.zeros(world.shape), **arguments)
     with pytest.raises(ValueError, match="agent must be a network of 6 inputs"):
         evaluate("Acrobot-v1", agent, seed=0, episodes=1, max_steps=5)
     with pytest.raises(TypeError, match=r"^agent must be an Agent, got None"):
@@ -199,6 +199,9 @@ GAUSSIAN = as_learned(
     ReinforceConfig(network=MLP(()), policy=Gaussian(mean="direct")),
     {"layer0.weight": np.zeros((2, 1), np.float32), "log_sigma": np.zeros(1, np.float32)},
 )
+SHORT = Agent(uniform(2, 3).actor._replace(parameters=np.zeros(8, np.float32)))
+TABLE = of_table(gridded("MountainCar-v0", 2), np.zeros((4, 3)))
+SEES_THREE = Policy(np.array([3, 3]), False, False, False, 2)
 
 
 @pytest.mark.parametrize(
@@ -208,7 +211,13 @@ GAUSSIAN = as_learned(
         ("MountainCar-v0", GAUSSIAN, "of 3 actions, got a Gaussian policy of 1"),
         ("MountainCarContinuous-v0", uniform(2, 3), "a Gaussian policy of 1 components, got a cat"),
         ("CartPole-v1", uniform(4, 3), "of 2 actions, got a categorical policy of 3"),
-        ("MountainCar-v0", uniform(2, 3)._replace(parameters=np.zeros(8, np.float32)), r"\(9,\)"),
+        ("MountainCar-v0", SHORT, r"\(9,\)"),
+        ("CartPole-v1", TABLE, "a table over 4 inputs"),
+        (
+            "Pendulum-v1",
+            Agent(TABLE.actor._replace(policy=SEES_THREE)),
+            "a Gaussian policy of 1 co",
+        ),
     ],
 )
 def test_an_agent_that_does_not_fit_its_environment_is_refused(env, agent, message):
@@ -228,7 +237,7 @@ def test_an_agent_that_does_not_fit_its_environment_is_refused(env, agent, messa
 def test_a_table_of_something_else_is_refused(Q, message):
     world = gridded("MountainCar-v0", 5)
     with pytest.raises((TypeError, ValueError), match=f"^Q must be {message}"):
-        evaluate_table(world, Q, seed=0, episodes=1, max_steps=5)
+        of_table(world, Q)
 
 
 @pytest.mark.parametrize("measures", [{"steps": max}, {"limited_return": max}, {"a": 3}, [max]])
@@ -295,14 +304,14 @@ def test_an_epsilon_greedy_agent_explores_that_share():
             of_values(PUMP, epsilon)
 
 
-def test_an_agent_of_a_module_is_refused_by_name():
+def test_an_agent_of_a_module_needs_to_know_the_spaces():
     config = ReinforceConfig(network=Module("toy_networks:make"))
-    with pytest.raises(ValueError, match=r"^network must be an MLP\(\.\.\.\), got Module"):
+    with pytest.raises(ValueError, match=r"^spaces must be given for ReinforceConfig.*, got None"):
         as_learned(config, {"body.weight": np.zeros((8, 2))})
 
 
 def test_weights_that_do_not_go_with_the_configuration_are_refused():
-    with pytest.raises(TypeError, match=r"^config must be a ReinforceConfig, got None"):
+    with pytest.raises(TypeError, match=r"^config must be a configuration of .*, got None"):
         as_learned(None, PUMP)
     with pytest.raises(TypeError, match=r"^weights must be a mapping of names to arrays, got None"):
         as_learned(CONTINUOUS, None)

@@ -21,12 +21,14 @@ import pytest
 import torch
 import toy_experiment
 import toy_learner
+import toy_task
 from toy_learner import ToyConfig, count_threads, extra_column, learn
 
 import rl_core
 from rl_core.dqn import DQNConfig, dqn
 from rl_core.experiments import Arm, DamagedResultWarning, provenance, run, runner
 from rl_core.experiments.store import ARRAYS, RECORD, TABLE, Store
+from rl_core.maze import Maze
 from rl_core.policies import MLP, Gaussian
 from rl_core.q_learning import QLearningConfig, q_learning
 from rl_core.reinforce import ReinforceConfig, reinforce
@@ -532,7 +534,7 @@ in_main.__module__ = "__main__"
     [
         ({"name": ""}, ValueError, "name must be a text that is not empty, got ''"),
         ({"name": 3}, TypeError, "name must be a text"),
-        ({"env": None}, TypeError, "env must be a Gymnasium id, a Make or an import path, got N"),
+        ({"env": None}, TypeError, "env must be a Gymnasium id, a Make, an import path, .*, got N"),
         ({"config": Thawed()}, TypeError, "config must be a frozen dataclass's .*, got Thawed"),
         ({"config": {"gamma": 1}}, TypeError, "config must be a frozen dataclass"),
         ({"config": ToyConfig}, TypeError, "config must be a frozen dataclass"),
@@ -615,6 +617,45 @@ def test_an_arm_that_cannot_run_stops_all_before_anything_runs(tmp_path, change,
     with pytest.raises((TypeError, ValueError), match=f"^arm 'wrong': {message}"):
         run([PLAIN, wrong], seeds=[0], store=tmp_path / "store", workers=1, **quiet)
     assert not (tmp_path / "store").exists()
+
+
+def test_an_arm_takes_a_class_a_function_or_a_task_and_keeps_where_it_stands():
+    for env, path in [
+        (Maze, "rl_core.maze:Maze"),
+        (toy_task.Corridor, "toy_task:Corridor"),
+        (Make("Pendulum-v1", {"g": 5.0}), Make("Pendulum-v1", {"g": 5.0})),
+    ]:
+        assert dataclasses.replace(ACROBOT, env=env).env == path
+    for nowhere in (lambda: Maze(), gymnasium.make("CartPole-v1"), 3):
+        with pytest.raises(TypeError, match=r"^env must be a Gymnasium id, a Make, .*file of its"):
+            dataclasses.replace(ACROBOT, env=nowhere)
+
+
+def test_an_id_that_a_worker_would_not_know_is_refused_before_anything_runs(tmp_path):
+    """A notebook registered it; a module that registers it when imported is found by workers."""
+    gymnasium.register(
+        "Short-v0", "gymnasium.envs.classic_control:CartPoleEnv", max_episode_steps=9
+    )
+    try:
+        arm = dataclasses.replace(ACROBOT, name="short", env="Short-v0", episodes=2, snapshots=())
+        here = run([arm], seeds=[0, 1], store=tmp_path / "here", workers=1, **quiet)
+        assert here.table["steps"].max() <= 9
+        message = r"^arm 'short': env must be known to workers, .* say 'module:Short-v0'"
+        with pytest.raises(ValueError, match=message):
+            run([arm], seeds=[0, 1], store=tmp_path / "store", workers=2, **quiet)
+        assert not list((tmp_path / "store").glob("results/*"))
+    finally:
+        del gymnasium.registry["Short-v0"]
+
+
+def test_an_arm_s_results_make_agents(tmp_path):
+    arm = dataclasses.replace(ACROBOT, labels={"rate": 0.1})
+    results = run([PLAIN, arm], seeds=[3, 1], store=tmp_path, workers=1, **quiet)
+    made = results.arm(arm.name)
+    assert list(made.table) == ["seed", *list(made.table)[1:]]
+    assert "rate" not in made.table
+    weights = made.agent(1).weights["layer0.weight"]
+    np.testing.assert_array_equal(weights, results.arrays(arm.name)["layer0.weight"][1])
 
 
 # --- several processes, and kills -----------------------------------------------------------------

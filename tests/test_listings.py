@@ -42,7 +42,7 @@ def test_at_most_25_lines(module):
     [
         ("rl_core.reinforce:gone", {}, "path must name a function .* no attribute 'gone'"),
         ("rl_core.gone:loss", {}, "path must name a function .* No module"),
-        ("rl_core.reinforce", {}, "path must name a function"),
+        ("rl_core.reinforce", {}, "path must be of at most 40 lines"),
         ("rl_core.reinforce:TorchLearner.loss", {"first": "gone"}, "first must be in the lines"),
         ("rl_core.reinforce:TorchLearner.loss", {"last": "gone"}, "last must be in the lines"),
         (
@@ -55,6 +55,14 @@ def test_at_most_25_lines(module):
 def test_lines_that_are_gone_are_missed(path, lines, message):
     with pytest.raises(ValueError, match=message):
         listing(path, **lines)
+
+
+def test_a_short_module_is_shown_whole():
+    shown = listing("examples.room_task")
+    assert shown.first_line == 1
+    assert shown.code.startswith('"""The same room')
+    assert shown.code.endswith("state[1] / DAY")
+    assert "href" not in shown._repr_html_()  # it has no place in the reference
 
 
 def test_the_page_names_the_file_and_links_to_its_reference(module):

@@ -14,7 +14,7 @@ from odd_values import ODD, PLAIN, try_out
 from test_appraisal import loss
 from toy_task import Corridor
 
-from rl_core.evaluation import evaluate_table
+from rl_core.evaluation import evaluate, of_table
 from rl_core.exploration import (
     EpsilonGreedy,
     Geometric,
@@ -303,6 +303,24 @@ GRID = QLearningConfig(
 )
 
 
+def test_tables_beyond_what_the_machine_has_are_refused():
+    """Of 45,000 bins a number the car has two thousand million cells, for three actions each."""
+    config = dataclasses.replace(GRID, bins=45_000)
+    for refused in (
+        lambda: check_q_learning("MountainCar-v0", config),
+        lambda: q_learning("MountainCar-v0", config, episodes=1, seeds=[0]),
+    ):
+        with pytest.raises(ValueError, match=r"^bins must be less: it would take .* GiB of memory"):
+            refused()
+
+
+def test_a_rule_that_never_ends_meets_a_budget():
+    assert QLearningConfig().max_env_steps is not None
+    config = QLearningConfig(exploration=EpsilonGreedy(0.0), max_env_steps=500)
+    run = q_learning(Maze().model(), config, episodes=10_000, seeds=[0])
+    assert run.table["env_steps"].iloc[-1] == 500
+
+
 def test_it_learns_mountain_car():
     run = q_learning("MountainCar-v0", GRID, episodes=1_000, seeds=[100, 101, 102])
     for position, seed in enumerate((100, 101, 102)):
@@ -310,7 +328,9 @@ def test_it_learns_mountain_car():
         assert steps.tail(100).median() < min(350, steps.head(20).median() / 2)
         Q = run.arrays["Q"][position]
         world = gridded("MountainCar-v0", 10)
-        played = evaluate_table(world, Q, seed=seed, episodes=20, max_steps=5_000)
+        played = evaluate(
+            "MountainCar-v0", of_table(world, Q), seed=seed, episodes=20, max_steps=5_000
+        )
         assert played["steps"].median() < 350
 
 

@@ -1,4 +1,4 @@
-"""Lines of `rl_core` on the page, taken from its source when the book is built."""
+"""Lines of code on the page, taken from its source when the book is built."""
 
 import html
 import importlib
@@ -14,8 +14,8 @@ from pygments.lexers import PythonLexer
 
 from rl_core.checks import require
 
-LONGEST = 25
-"""Lines of a listing: what can be read beside its equation."""
+LONGEST, WHOLE = 25, 40
+"""Lines of a listing: what can be read beside its equation, and a module that is an example."""
 
 _DOCSTRING = re.compile(r'^[ \t]+"""(?:.|\n)*?"""[ \t]*\n', re.MULTILINE)
 
@@ -36,7 +36,9 @@ class Listing:
 
     def _repr_html_(self) -> str:
         title = f"{html.escape(self.title)} " if self.title else ""
-        place = f'<a href="api.html#module-{self.module}"><code>{self.file}</code></a>'
+        place = f"<code>{self.file}</code>"
+        if self.module.startswith("rl_core."):
+            place = f'<a href="api.html#module-{self.module}">{place}</a>'
         code = highlight(self.code, PythonLexer(), HtmlFormatter(wrapcode=True))
         return (
             f'<div class="listing"><p>{title}{place}, from line {self.first_line}</p>{code}</div>'
@@ -52,7 +54,7 @@ def listing(path: str, title: str = "", *, first: str = "", last: str = "") -> L
     Parameters
     ----------
     path : str
-        "module:function" or "module:Class.method". Compiled functions are shown as written.
+        "module:function" or "module:Class.method", compiled functions as written; or "module".
     title : str
         What to say before the file's name.
     first, last : str
@@ -61,7 +63,7 @@ def listing(path: str, title: str = "", *, first: str = "", last: str = "") -> L
     Raises
     ------
     ValueError
-        If the lines are not there, or are more than 25.
+        If the lines are not there, or are more than 25, a module's more than 40.
 
     Examples
     --------
@@ -86,19 +88,21 @@ def lines_of(path: str, *, first: str = "", last: str = "") -> str:
 def _lines(path: str, first: str, last: str) -> tuple[str, int, str]:
     module, _, name = path.partition(":")
     try:
-        found = reduce(getattr, name.split("."), importlib.import_module(module))
+        found = importlib.import_module(module)
+        found = reduce(getattr, name.split("."), found) if name else found
     except (ImportError, AttributeError, ValueError) as error:
         raise ValueError(f"path must name a function of a module, got {path!r}: {error}") from None
     found = getattr(found, "py_func", found)  # numba's compiled function holds what was written
     source, start = inspect.getsourcelines(inspect.unwrap(found))
+    start = start if name else 1
     begin = _place("first", first, source, 0) if first else 0
     end = _place("last", last, source, begin) if last else len(source) - 1
     code = "".join(source[begin : end + 1])
-    if not first:
+    if not first and name:
         code = _DOCSTRING.sub("", code, count=1)
     code = textwrap.dedent(code).strip("\n")
-    length = code.count("\n") + 1
-    require(length <= LONGEST, "path", path, f"of at most {LONGEST} lines (it has {length})")
+    length, longest = code.count("\n") + 1, LONGEST if name else WHOLE
+    require(length <= longest, "path", path, f"of at most {longest} lines (it has {length})")
     return module, start + begin, code
 
 

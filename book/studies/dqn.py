@@ -59,7 +59,7 @@ NO_REPLAY_MENDED = "original, all mended, no replay"
 
 def reported(name: str) -> DQNConfig:
     """What figures 12 and 13 were made with."""
-    return DQNConfig(
+    return DQNConfig.report_2018(
         memory_size=MEMORY[name],
         learning_starts=MEMORY[name],
         shaping=SHAPING[name],

@@ -17,7 +17,7 @@ from scipy.stats import kendalltau
 from report.claims import Claim, Criterion, Evidence, Finding, Reading
 from report.seeds import SEEDS
 from rl_core.dqn import dqn
-from rl_core.evaluation import Agent, as_learned, evaluate, evaluate_table, greedy, of_values
+from rl_core.evaluation import Agent, as_learned, evaluate, greedy, of_table, of_values
 from rl_core.experiments import Arm, Results, run
 from rl_core.exploration import EpsilonGreedy, Linear, Trials
 from rl_core.q_learning import QLearningConfig, q_learning
@@ -62,6 +62,7 @@ def table_config(name: str, bins: int, limit: int = TABLE_CAP) -> QLearningConfi
         step_size=0.3,
         exploration=EpsilonGreedy(Linear(1.0, 0.02, episodes=500)),
         max_steps=limit,
+        max_env_steps=None,
         evaluation=Trials(every=TABLE_EPISODES, episodes=1, max_steps=1),  # done below
         bins=bins,
         levels=LEVELS[name],
@@ -227,7 +228,7 @@ def try_out(one: Tried, results: Results) -> pd.DataFrame:
         Q = None if one.arm is None else results.arrays(one.arm)["Q"]
         for i, seed in enumerate(SEEDS):
             values = np.zeros(world.shape) if Q is None else Q[i]
-            tables.append(evaluate_table(world, values, seed=seed, **rules))
+            tables.append(evaluate(env, of_table(world, values), seed=seed, **rules))
     else:
         arrays = results.arrays(one.arm)
         config = next(arm.config for arm in arms() if arm.name == one.arm)
@@ -615,7 +616,9 @@ def gentle(forces: Sequence[float]) -> pd.DataFrame:
     rows = []
     for force in forces:
         softer = world._replace(actions=(world.actions * force).astype(np.float32))
-        played = evaluate_table(softer, along, seed=0, episodes=EPISODES, max_steps=10 * CAP)
+        driver = of_table(softer, along)
+        rules = {"seed": 0, "episodes": EPISODES, "max_steps": 10 * CAP}
+        played = evaluate(ENV["MountainCarContinuous"], driver, **rules)
         means = {name: played[name].mean() for name in ("steps", "return")}
         rows.append({"force": force, **means, "reached": played["terminated"].mean()})
     return pd.DataFrame(rows)

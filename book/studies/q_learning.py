@@ -39,7 +39,11 @@ def arm(name: str, *, step_size=STEP_SIZE, exploration=None, snapshots=(), max_s
     if exploration is None:
         exploration = EpsilonGreedy(1 - EXPLOITATION)
     config = QLearningConfig(
-        gamma=GAMMA, step_size=step_size, exploration=exploration, max_steps=max_steps
+        gamma=GAMMA,
+        step_size=step_size,
+        exploration=exploration,
+        max_steps=max_steps,
+        max_env_steps=None,
     )
     learner = q_learning_on_model
     return Arm(name, learner, "rl_core/Maze-v0", config, EPISODES, snapshots=snapshots)

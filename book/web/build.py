@@ -4,62 +4,18 @@
 """
 
 import argparse
-import csv
 import os
 import shutil
+import subprocess
 import sys
-from math import ceil
+import time
 from pathlib import Path
 
 import pictures
-from stamp import run
+from announce import FULL, announce
 
 ROOT = Path(__file__).parents[2]
-FULL = 30
 STRICT = ("--warningiserror", "--nitpick", "--keep-going")
-
-
-def minutes(cores: int, serial: float, parallel: float) -> int:
-    """Return how long a build takes on so many cores, by Amdahl's law.
-
-    Parameters
-    ----------
-    cores : int
-        The cores that are free to use.
-    serial, parallel : float
-        Processor time that only one core can take on, and that all can share, in seconds.
-
-    Examples
-    --------
-    >>> minutes(1, 600, 600), minutes(2, 600, 600), minutes(100, 600, 600)
-    (20, 15, 11)
-    """
-    return ceil((serial + parallel / cores) / 60)
-
-
-def expected(what: str, cores: int) -> int:
-    """How many minutes a build took when it was last timed, for this number of cores."""
-    with (ROOT / "book/data/timing.csv").open(encoding="utf-8") as file:
-        row = next(row for row in csv.DictReader(file) if row["what"] == what)
-    measured, seconds, busy = (float(row[key]) for key in ("cores", "seconds", "processor_seconds"))
-    serial = (measured * seconds - busy) / (measured - 1)
-    return minutes(cores, serial, busy - serial)
-
-
-def announce(seeds: int) -> None:
-    """Say what comes, how long it takes, and how to see something sooner."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    what = "book" if seeds == FULL else "preview"
-    print(
-        f"Building the {what}: all notebooks with {seeds} seeds an arm, then the pages. On {cores} "
-        f"core{'s' * (cores != 1)} about {expected(what, cores)} minutes from nothing; what is in "
-        "results/store is not made again. Ctrl-C is safe: finished runs are kept.",
-        flush=True,
-    )
-    if seeds == FULL:
-        print(
-            f"A preview takes {expected('preview', cores)} minutes: make book SEEDS=3", flush=True
-        )
 
 
 def copied(folder: Path, *, preview: bool, only: list[str]) -> Path:
@@ -85,6 +41,29 @@ def copied(folder: Path, *, preview: bool, only: list[str]) -> Path:
     return folder
 
 
+def run(command: list[str], notebooks: int) -> int:
+    """Run a build, pass on what it says, and tell how far the whole book is; return its exit code.
+
+    If interrupted, let it end by itself first.
+    """
+    begun, start = 0, time.monotonic()
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, errors="replace") as process:
+        assert process.stdout is not None
+        try:
+            for line in process.stdout:
+                print(line, end="", flush=True)
+                if "Executing notebook using" in line:
+                    begun += 1
+                    passed = (time.monotonic() - start) / 60
+                    print(
+                        f"--- notebook {begun} of {notebooks}, after {passed:.0f} min", flush=True
+                    )
+            return process.wait()
+        except KeyboardInterrupt:  # the command got it too
+            process.wait()
+            raise
+
+
 def build(seeds: int, only: list[str]) -> int:
     """Execute and build; return an exit code.
 
@@ -101,7 +80,8 @@ def build(seeds: int, only: list[str]) -> int:
     if only or seeds != FULL:
         source = copied(target / "_build" / "source", preview=seeds != FULL, only=only)
     command = ["jupyter-book", "build", str(source), "--path-output", str(target)]
-    code = run(command if only else [*command, *STRICT])
+    notebooks = len(only) or len(list((source / "book").glob("*.ipynb")))
+    code = run(command if only else [*command, *STRICT], notebooks)
     lost = [] if code else pictures.missing(source / "book", target / "_build" / "html" / "book")
     print("\n".join(lost), file=sys.stderr)
     if only and not code:
@@ -113,11 +93,12 @@ def main() -> int:
     """Read the command line and build."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", nargs="+", default=[], help="pages, such as 03_reinforce")
-    only = parser.parse_args().only
+    only, seeds = parser.parse_args().only, int(os.environ.get("SEEDS") or FULL)
     try:
-        return build(int(os.environ.get("SEEDS") or FULL), only)
+        return build(seeds, only)
     except KeyboardInterrupt:
-        print("Interrupted; what is finished is kept. A first look: make book SEEDS=3", flush=True)
+        offer = "" if only or seeds != FULL else " A first look in minutes: make book SEEDS=3"
+        print(f"Interrupted; what is finished is kept.{offer}", flush=True)
         return 130
 
 

@@ -32,9 +32,10 @@ class Arm:
         imported, so that a worker can find it. It is called with one seed at a time and must be a
         pure function of its arguments. If a function `check_<algorithm>(env, config)` stands beside
         it in its module, it is asked before anything runs (`check`).
-    env : str or Make
+    env : str or Make or callable or Task
         The environment: a Gymnasium id, `Make(id, arguments)`, or an import path
-        "module:attribute" (`rl_core.worlds.names`).
+        "module:attribute" (`rl_core.worlds.names`). A class, function or compiled task is kept as
+        its import path, under which a worker finds it.
     config : dataclass
         Frozen; its values in terms of JSON (`rl_core.identity.describe`).
     episodes : int
@@ -62,7 +63,7 @@ class Arm:
 
     name: str
     algorithm: Callable[..., Run]
-    env: EnvironmentName
+    env: Any
     config: Any
     episodes: int
     snapshots: tuple[int, ...] = ()
@@ -73,7 +74,7 @@ class Arm:
             self,
             name=(instance, str, "a text that is not empty"),
             algorithm=(_importable, "a function"),
-            env=(instance, EnvironmentName, "a Gymnasium id, a Make or an import path"),
+            env=(_name,),
             episodes=(integer, 1),
             snapshots=(instance, tuple, "a tuple of integers"),
             labels=(instance, Mapping, "a mapping of names to values"),
@@ -155,6 +156,10 @@ class Arm:
             "platform": provenance.platform_settings(),
             "versions": provenance.versions(),
         }
+
+
+def _name(_: str, value: object) -> EnvironmentName:
+    return names.name_of(value)
 
 
 def _importable(name: str, value: object, allowed: str) -> object:

@@ -35,6 +35,8 @@ from rl_core.experiments.store import DamagedResultError, Store, Stored, scratch
 from rl_core.experiments.workers import Outcome, Task, run_task, use_threads
 from rl_core.identity import canonical_json, digest
 from rl_core.kernels.arrays import Arrays
+from rl_core.training import Failure, Run
+from rl_core.worlds.names import check_elsewhere
 
 TEMPORARY = "rl_core-"  # what joblib's temporary folders are called
 
@@ -64,6 +66,23 @@ class Results:
     failures: pd.DataFrame
     provenance: pd.DataFrame
     _store: Store = field(repr=False)
+    _arms: Mapping[str, Arm] = field(default_factory=dict, repr=False)
+
+    def arm(self, name: str) -> Run:
+        """Return an arm's results as its algorithm returned them, to make agents of.
+
+        Raises
+        ------
+        ValueError
+            There is no such arm.
+        """
+        arrays, own = self.arrays(name), self._arms[name]
+        table, failed = (
+            one[one["arm"] == name].drop(columns=["arm", *own.labels], errors="ignore")
+            for one in (self.table, self.failures)
+        )
+        failures = tuple(Failure(*row) for row in failed.itertuples(index=False))
+        return Run(table.reset_index(drop=True), arrays, failures, own.env, own.config)
 
     def arrays(self, arm: str) -> Arrays:
         """Return what the seeds of `arm` learned: each array's first axis is the seed.
@@ -169,10 +188,21 @@ def run(
     stored = {task: _read(store, task) for task in tasks}
     missing = [task for task in tasks if stored[task] is None]
     if missing:
+        if workers > 1 and backend != "threading":
+            _check_workers(missing)
         _work(missing, store, workers, backend, progress)
     for task in missing:
         stored[task] = store.read(task.digest)
     return _results({task: _present(task, result) for task, result in stored.items()}, store)
+
+
+def _check_workers(tasks: Sequence[Task]) -> None:
+    """Raise if another process would not find an arm's environment."""
+    for arm in {task.arm.name: task.arm for task in tasks}.values():
+        try:
+            check_elsewhere(arm.env, [arm.algorithm_name.partition(":")[0]])
+        except ValueError as error:
+            raise ValueError(f"arm {arm.name!r}: {error}") from error
 
 
 def _checked_arms(arms: object) -> list[Arm]:
@@ -296,4 +326,5 @@ def _results(stored: Mapping[Task, Stored], store: Store) -> Results:
         failures=pd.DataFrame(failures, columns=list(columns)).astype(columns),
         provenance=pd.DataFrame(origins),
         _store=store,
+        _arms={task.arm.name: task.arm for task in stored},
     )

@@ -107,17 +107,21 @@ class Actor(NamedTuple):
         Probability of a uniformly random action instead, where actions are discrete.
     units : float32 array of shape (sum(policy.sizes),)
         Scratch space.
+    noise : float64 array of shape (action_width,)
+        Room for what is drawn before each action.
     """
 
     policy: Policy
     parameters: F32
     epsilon: float
     units: F32
+    noise: F64
 
 
 def make_actor(policy: Policy, parameters: F32, epsilon: float = 0.0) -> Actor:
     """Return an actor that follows `parameters`, also as they change."""
-    return Actor(policy, parameters, epsilon, np.empty(int(policy.sizes.sum()), np.float32))
+    units = np.empty(int(policy.sizes.sum()), np.float32)
+    return Actor(policy, parameters, epsilon, units, np.empty(policy.action_width))
 
 
 @compiled
@@ -141,15 +145,27 @@ def choose_action(actor: Actor, observation: F32, noise: F64, action: F32) -> No
     >>> action
     array([1.], dtype=float32)
     """
-    policy, parameters, epsilon, units = actor
-    if noise[0] < epsilon and not policy.gaussian:
-        action[0] = int(noise[0] / epsilon * policy.sizes[-1])
+    policy, parameters, epsilon, units, _ = actor
+    if explores(policy, epsilon, noise, action):
         return
-    if epsilon > 0.0 and not policy.gaussian:  # what is left of the uniform is uniform again
-        noise[0] = (noise[0] - epsilon) / (1.0 - epsilon)
     _write_features(policy, observation, units)
     networks.forward_one(policy.sizes, parameters, units)
     draw_action(policy, parameters[parameters.size - policy.action_width :], units, noise, action)
+
+
+@compiled
+def explores(policy: Policy, epsilon: float, noise: F64, action: F32) -> bool:
+    """Write a uniformly random action with probability epsilon, where actions are discrete.
+
+    If it does not, what is left of the uniform in `noise` is made uniform again.
+    """
+    if policy.gaussian or epsilon == 0.0:
+        return False
+    if noise[0] < epsilon:
+        action[0] = int(noise[0] / epsilon * policy.sizes[-1])
+        return True
+    noise[0] = (noise[0] - epsilon) / (1.0 - epsilon)
+    return False
 
 
 @compiled

@@ -26,7 +26,7 @@ import numpy as np
 from rl_core.kernels import choices, networks
 from rl_core.kernels.arrays import F32, F64, I64
 from rl_core.kernels.compiled import compiled, compiled_as
-from rl_core.kernels.replay import Memory
+from rl_core.kernels.replay import Memory, number
 
 STEPS, UPDATES, COPIES, KEPT, ACTION = range(5)
 """Entries of `Learner.counts`; for `KEPT` more steps the random `ACTION` is kept."""
@@ -172,7 +172,7 @@ def _next_values(learner: Learner, memory: Memory) -> None:
             memory.stamps[slot] = learner.counts[COPIES]
             learner.stale[count] = slot
             for i in range(n_in):
-                units[i, count] = memory.next_observations[slot, i]
+                units[i, count] = number(memory.next_observations, slot, i)
             count += 1
     if count == 0:
         return
@@ -239,7 +239,7 @@ def loss_gradient(learner: Learner, memory: Memory) -> float:
     _next_values(learner, memory)
     for k in range(n):
         for i in range(n_in):
-            units[i, k] = memory.observations[learner.slots[k], i]
+            units[i, k] = number(memory.observations, learner.slots[k], i)
     networks.forward(learner.sizes, learner.parameters, units, n_padded)
     values, delta = units[len(units) - n_out :], deltas[len(units) - n_out :]
     delta[:] = 0.0

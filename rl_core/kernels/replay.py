@@ -11,11 +11,14 @@ Source: L.-J. Lin (1992), Self-improving reactive agents based on reinforcement 
 and teaching.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba.core.types import uint8
+from numba.extending import overload
+from numpy.typing import NDArray
 
-from rl_core.kernels.arrays import F32, F64, I64, Bools
+from rl_core.kernels.arrays import F32, F64, I64, Bools, Bytes
 from rl_core.kernels.compiled import compiled
 
 NEVER = -1
@@ -27,8 +30,8 @@ class Memory(NamedTuple):
 
     Attributes
     ----------
-    observations, next_observations : float32 arrays of shape (N, n_observations)
-        s and s'.
+    observations, next_observations : float32 or uint8 arrays of shape (N, n_observations)
+        s and s'. Bytes stand for 0..1 in steps of 1 / 255.
     actions : int64 array of shape (N,)
     rewards : float64 array of shape (N,)
         What is learned from: the shaped rewards, where rewards are shaped.
@@ -42,8 +45,8 @@ class Memory(NamedTuple):
         Transitions stored so far, the overwritten ones included.
     """
 
-    observations: F32
-    next_observations: F32
+    observations: F32 | Bytes
+    next_observations: F32 | Bytes
     actions: I64
     rewards: F64
     ends: Bools
@@ -52,7 +55,22 @@ class Memory(NamedTuple):
     stored: I64
 
 
-def make_memory(capacity: int, n_observations: int) -> Memory:
+BYTE = np.float32(1 / 255)
+"""What a byte of an observation counts."""
+
+
+def bytes_a_transition(n_observations: int, *, as_bytes: bool = False) -> int:
+    """Return the room that a transition takes, in bytes.
+
+    Examples
+    --------
+    >>> bytes_a_transition(4), sum(array.nbytes for array in make_memory(1, 4)[:-1])
+    (61, 61)
+    """
+    return sum(array.nbytes for array in make_memory(1, n_observations, as_bytes=as_bytes)[:-1])
+
+
+def make_memory(capacity: int, n_observations: int, *, as_bytes: bool = False) -> Memory:
     """Make an empty memory.
 
     Parameters
@@ -61,6 +79,8 @@ def make_memory(capacity: int, n_observations: int) -> Memory:
         N, the transitions that it keeps, at least 1.
     n_observations : int
         Numbers in an observation.
+    as_bytes : bool
+        Whether they are bytes, scaled to 0..1, and to be kept as such.
 
     Examples
     --------
@@ -68,9 +88,10 @@ def make_memory(capacity: int, n_observations: int) -> Memory:
     >>> memory.observations.shape, held(memory)
     ((3000, 6), 0)
     """
+    kind: Any = np.uint8 if as_bytes else np.float32
     return Memory(
-        np.zeros((capacity, n_observations), np.float32),
-        np.zeros((capacity, n_observations), np.float32),
+        np.zeros((capacity, n_observations), kind),
+        np.zeros((capacity, n_observations), kind),
         np.zeros(capacity, np.int64),
         np.zeros(capacity),
         np.zeros(capacity, np.bool_),
@@ -78,6 +99,60 @@ def make_memory(capacity: int, n_observations: int) -> Memory:
         np.full(capacity, NEVER, np.int64),
         np.zeros(1, np.int64),
     )
+
+
+def keep(room: NDArray[Any], observation: F32) -> None:
+    """Write an observation into the memory's row for it, as floats or as bytes.
+
+    Examples
+    --------
+    >>> row = np.zeros(2, np.uint8)
+    >>> keep(row, np.array([0.2, 1.0], np.float32))
+    >>> row, scaled(row).round(3)
+    (array([ 51, 255], dtype=uint8), array([0.2, 1. ], dtype=float32))
+    """
+    room[:] = observation if room.dtype != np.uint8 else np.rint(observation / BYTE)
+
+
+def scaled(kept: NDArray[Any]) -> F32:
+    """Return what was kept as floats; see `keep`."""
+    return kept if kept.dtype != np.uint8 else kept * BYTE
+
+
+@compiled
+def _keep_floats(room: NDArray[Any], observation: F32) -> None:
+    for i in range(observation.size):
+        room[i] = observation[i]
+
+
+@compiled
+def _keep_bytes(room: NDArray[Any], observation: F32) -> None:
+    for i in range(observation.size):
+        room[i] = np.uint8(observation[i] / BYTE + np.float32(0.5))
+
+
+# What it means in compiled code is decided by the type of what is kept.
+overload(keep)(
+    lambda room, observation: (
+        (lambda room, observation: _keep_bytes(room, observation))
+        if room.dtype is uint8
+        else (lambda room, observation: _keep_floats(room, observation))
+    )
+)
+
+
+def number(kept: Any, slot: int, i: int) -> float:
+    """Return one number of an observation that is kept; see `keep`."""
+    return float(scaled(kept[slot, i : i + 1])[0])
+
+
+overload(number)(
+    lambda kept, slot, i: (
+        (lambda kept, slot, i: kept[slot, i] * BYTE)
+        if kept.dtype is uint8
+        else (lambda kept, slot, i: kept[slot, i])
+    )
+)
 
 
 @compiled
@@ -121,9 +196,8 @@ def store(
     array([-3., -2.])
     """
     slot = memory.stored[0] % memory.actions.size
-    for i in range(observation.size):
-        memory.observations[slot, i] = observation[i]
-        memory.next_observations[slot, i] = next_observation[i]
+    keep(memory.observations[slot], observation)
+    keep(memory.next_observations[slot], next_observation)
     memory.actions[slot] = action
     memory.rewards[slot] = reward
     memory.ends[slot] = end

@@ -35,6 +35,10 @@ EnvironmentLike = (
 _NO_NUMBERS: Any = None
 
 
+BYTE = np.float32(1 / 255)
+"""What a byte of an observation counts."""
+
+
 class TaskWorld:
     """A compiled task.
 
@@ -42,6 +46,8 @@ class TaskWorld:
     ----------
     task : rl_core.worlds.tasks.Task
     """
+
+    as_bytes = False
 
     def __init__(self, task: Task) -> None:
         self.n_observations = task.n_observations
@@ -70,7 +76,7 @@ class GymnasiumWorld:
     """Any Gymnasium environment with Box observations and Discrete or Box actions.
 
     Its time limit, if it has one, ends an episode as truncated. Observations are flattened and cast
-    to float32.
+    to float32; bytes (pictures) are scaled from 0..255 to 0..1.
 
     Parameters
     ----------
@@ -91,14 +97,16 @@ class GymnasiumWorld:
         if not isinstance(actions, spaces.Discrete | spaces.Box):
             raise ValueError(f"env must have a Discrete or a Box action space, got {actions}")
         self.n_observations = math.prod(observations.shape)
+        self.as_bytes = observations.dtype == np.uint8
         self.n_actions = int(actions.n) if isinstance(actions, spaces.Discrete) else 0
         self.action_dimensions = math.prod(actions.shape) if isinstance(actions, spaces.Box) else 0
         self.max_episode_steps: int | None = None
         self.stepper = self
         self._environment = environment
         self._space, self._actions = observations, actions
-        # What is written as it came; -1: it has to be flattened first.
-        self._length = observations.shape[0] if len(observations.shape) == 1 else -1
+        # What is written as it came; -1: it has to be flattened or scaled first.
+        self._length = self.n_observations if len(observations.shape) == 1 else -1
+        self._length = -1 if self.as_bytes else self._length
         self._owned = owned
         self._seed: int | None = None
         self._steps = 0
@@ -111,7 +119,9 @@ class GymnasiumWorld:
         """Begin an episode; return its first observation."""
         observation, _ = self._environment.reset(seed=self._seed)
         self._seed, self._steps = None, 0
-        return observed(self._space, observation, self).ravel().astype(np.float32)
+        first = np.empty(self.n_observations, np.float32)
+        self._write(observation, first)
+        return first
 
     def step(self, action: F32, following: F32) -> tuple[float, bool, bool]:
         """Take one step; see `step`."""
@@ -121,10 +131,16 @@ class GymnasiumWorld:
         try:  # the quick way: numpy refuses other shapes, but for one number, and what is no number
             copyto(following, seen if len(seen) == self._length else _NO_NUMBERS)
         except (RuntimeError, TypeError, ValueError):
-            following[:] = observed(self._space, seen, self).ravel()
+            self._write(seen, following)
         if type(reward) is not float:  # numpy's float64 is one, too
             reward = float(reward) if isinstance(reward, float) else checked_reward(self, reward)
         return reward, bool(terminated), bool(truncated)
+
+    def _write(self, seen: Any, numbers: F32) -> None:
+        """Write what is seen, if it is what its space says: compiled code relies on its size."""
+        numbers[:] = observed(self._space, seen, self).ravel()
+        if self.as_bytes:
+            numbers *= BYTE
 
     def __str__(self) -> str:
         name = self._environment.spec.id if self._environment.spec else self._environment

@@ -11,11 +11,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
+from numba.extending import overload
 
 from rl_core.kernels import likelihood
 from rl_core.kernels.arrays import F32, F64
-from rl_core.kernels.compiled import compiled, compiled_as
+from rl_core.kernels.choices import EPSILON_GREEDY, choose
+from rl_core.kernels.compiled import compiled
 from rl_core.kernels.likelihood import Actor, Policy
+from rl_core.worlds.discretise import Grid, cell
 from rl_core.worlds.environments import TaskWorld, World, step
 
 
@@ -27,36 +30,89 @@ def with_constant(policy: Policy, observations: F32) -> F32:
 
 
 class ModuleActor(NamedTuple):
-    """Draws actions from the policy of a torch module; `Actor` is its compiled counterpart."""
+    """Draws actions from the policy of a torch module; `Actor` is its compiled counterpart.
+
+    `scale` multiplies the preferences for discrete actions: 1 / T of a temperature T.
+    """
 
     policy: Policy
     module: torch.nn.Module
     log_sigma: torch.Tensor
+    noise: F64
+    scale: np.float32 = np.float32(1.0)
+    epsilon: float = 0.0
 
 
-def act(actor: Actor | ModuleActor, observation: F32, noise: F64, action: F32) -> None:
+class TableActor(NamedTuple):
+    """Acts epsilon-greedily on a table of action values over the cells of a grid.
+
+    Attributes
+    ----------
+    policy : Policy
+        Of the sizes (d, n_actions): what is seen, and what there is to choose from.
+    grid : Grid
+    Q : float64 array of shape (n_cells, n_actions)
+        Of several largest values, one is drawn.
+    actions : float32 array of shape (n_actions, action_width)
+        What the environment is given.
+    epsilon : float
+    noise : float64 array of shape (2,)
+    """
+
+    policy: Policy
+    grid: Grid
+    Q: F64
+    actions: F32
+    epsilon: float
+    noise: F64
+
+
+AnyActor = Actor | ModuleActor | TableActor
+
+
+def act(actor: AnyActor, observation: F32, noise: F64, action: F32) -> None:
     """Turn noise into an action drawn from pi(.|s), and write it to `action`.
 
     Parameters
     ----------
-    actor : Actor or ModuleActor
+    actor : Actor or ModuleActor or TableActor
     observation : float32 array of shape (n_observations,)
-    noise : float64 array of shape (action_width,)
-        Uniform for a categorical policy, standard normal for a Gaussian one.
+    noise : float64 array of the shape of `actor.noise`
+        Uniform for discrete actions, standard normal for a Gaussian policy.
     action : float32 array of shape (action_width,)
         A Gaussian action is written as drawn, not clipped to any bounds.
     """
     if isinstance(actor, Actor):
         likelihood.choose_action(actor, observation, noise, action)
         return
+    if isinstance(actor, TableActor):
+        _look_up(actor, observation, noise, action)
+        return
+    if actor.epsilon > 0.0 and likelihood.explores(actor.policy, actor.epsilon, noise, action):
+        return
     features = with_constant(actor.policy, observation[None])
     with torch.no_grad():
         outputs = actor.module(torch.from_numpy(features))[0].numpy()
-    units = np.concatenate([features[0], outputs])
+    units = np.concatenate([features[0], outputs * actor.scale])
     likelihood.draw_action(actor.policy, actor.log_sigma.detach().numpy(), units, noise, action)
 
 
-compiled_as(act, likelihood.choose_action)
+@compiled
+def _look_up(actor: TableActor, observation: F32, noise: F64, action: F32) -> None:
+    values = actor.Q[cell(actor.grid, observation)]
+    action[:] = actor.actions[choose(EPSILON_GREEDY, actor.epsilon, values, noise[0], noise[1])]
+
+
+# What it means in compiled code is decided by the type of the actor.
+_acts: dict[type, Any] = {
+    Actor: lambda actor, observation, noise, action: likelihood.choose_action(
+        actor, observation, noise, action
+    ),
+    TableActor: lambda actor, observation, noise, action: _look_up(
+        actor, observation, noise, action
+    ),
+}
+overload(act)(lambda actor, observation, noise, action: _acts[actor.instance_class])
 
 
 class Trajectory:
@@ -109,7 +165,7 @@ def play(
     terminated, truncated : bool
         Neither, if it stopped at `stop`.
     """
-    noise = np.empty(actions.shape[1])
+    noise = actor.noise
     while t < stop:
         for k in range(noise.size):
             noise[k] = rng.standard_normal() if actor.policy.gaussian else rng.random()
@@ -126,7 +182,7 @@ _play_compiled = compiled(play)
 
 def play_episode(
     world: World,
-    actor: Actor | ModuleActor,
+    actor: AnyActor,
     rng: np.random.Generator,
     max_steps: int,
     trajectory: Trajectory,
@@ -136,7 +192,7 @@ def play_episode(
     Parameters
     ----------
     world : World
-    actor : Actor or ModuleActor
+    actor : Actor or ModuleActor or TableActor
     rng : numpy.random.Generator
         Stream of the policy.
     max_steps : int
@@ -159,7 +215,7 @@ def play_episode(
     >>> play_episode(world, actor, np.random.default_rng(0), 100, Trajectory(2, 1))
     (100, False)
     """
-    both = isinstance(world, TaskWorld) and isinstance(actor, Actor)
+    both = isinstance(world, TaskWorld) and not isinstance(actor, ModuleActor)
     go_on = _play_compiled if both else play
     max_steps = min(max_steps, world.max_episode_steps or max_steps)
     trajectory.observations[0] = world.reset()

@@ -8,7 +8,10 @@ and all of them can be told apart (`identity`).
 import dataclasses
 import importlib
 import json
-from collections.abc import Mapping
+import os
+import subprocess
+import sys
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import reduce
 from typing import Any
@@ -63,6 +66,8 @@ class Make:
 
 EnvironmentName = str | Make
 
+_FIRST = frozenset(registry)  # the ids that were there before anybody's notebook registered one
+
 
 def find(env: EnvironmentName) -> Any:
     """Return what stands at the import path `env`, or None if `env` is a Gymnasium id.
@@ -97,6 +102,57 @@ def find(env: EnvironmentName) -> Any:
         if any(spec.name == path for spec in registry.values()):  # an id without version
             return None
         raise ValueError(f"env must name what its module has, got {env!r}: {error}") from error
+
+
+def name_of(env: Any) -> EnvironmentName:
+    """Return the name of an environment: a name itself, or where a function, class or task stands.
+
+    Raises
+    ------
+    TypeError
+        A worker could not find it there.
+
+    Examples
+    --------
+    >>> from rl_core.maze import Maze
+    >>> from rl_core.worlds.names import name_of
+    >>> name_of(Maze), name_of("CartPole-v1")
+    ('rl_core.maze:Maze', 'CartPole-v1')
+    """
+    if isinstance(env, EnvironmentName):
+        return env
+    module, name = getattr(env, "module", ""), getattr(env, "name", "")  # of a compiled task
+    if module not in ("", "__main__") and getattr(sys.modules.get(module), name, None) is env:
+        return f"{module}:{name}"
+    allowed = "a Gymnasium id, a Make, an import path, or a class, function or task that stands"
+    return import_path("env", env, allowed)
+
+
+def check_elsewhere(env: EnvironmentName, modules: Iterable[str]) -> None:
+    """Raise unless a new process that imports these modules knows an id that this one knows.
+
+    What a notebook or script registers, its workers have not run.
+
+    Raises
+    ------
+    ValueError
+        With what to do.
+    """
+    name = env.id if isinstance(env, Make) else env
+    spec = registry.get(name)
+    top = str(getattr(spec, "entry_point", "")).partition(".")[0]
+    if spec is None or (name in _FIRST and top in ("gymnasium", "rl_core")):
+        return
+    program = f"import gymnasium, {', '.join(modules)}\ngymnasium.spec({name!r})"
+    path = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    known = subprocess.run([sys.executable, "-c", program], env=path, capture_output=True)
+    require(
+        known.returncode == 0,
+        "env",
+        name,
+        "known to workers, which import modules but run no notebook or script: register it in a "
+        f"module and say 'module:{name}', or name its class as 'module:Class'",
+    )
 
 
 def make_environment(env: EnvironmentName) -> gymnasium.Env[Any, Any]:

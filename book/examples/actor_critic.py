@@ -15,10 +15,11 @@ import numpy as np
 import torch
 
 from rl_core.checks import fields, instance, integer, number, optional, positive, require
-from rl_core.modules import as_arrays, make_module, reproducible
-from rl_core.policies import MLP, Network
+from rl_core.modules import as_arrays, load_arrays, make_module, reproducible
+from rl_core.policies import MLP, Categorical, Network, make_policy
 from rl_core.training import spawn_streams, train_seeds
 from rl_core.worlds.environments import one_seed_of, open_world, step
+from rl_core.worlds.episodes import ModuleActor
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,14 @@ class ActorCriticConfig:
         fields(self, gamma=(number, 0, 1), policy=network, value=network)
         rate, cap = (positive,), (optional, integer, 1)
         fields(self, policy_rate=rate, value_rate=rate, max_episode_steps=cap, max_env_steps=cap)
+
+    def actor(self, weights, observations, actions):
+        """Return who acts with the weights of one seed (`rl_core.evaluation.as_learned`)."""
+        n_seen = observations.shape[0]
+        net = make_module(self.policy, n_seen, int(actions.n), np.random.default_rng(0))
+        load_arrays(net, {k[7:]: v for k, v in weights.items() if k.startswith("policy.")})
+        kind = make_policy(Categorical(), (), n_seen, int(actions.n), 0)
+        return ModuleActor(kind, net, torch.zeros(0), np.empty(1))
 
 
 def _make_networks(world, config, rng):
@@ -97,4 +106,5 @@ def actor_critic(env, config, *, episodes, seeds, snapshots=(), progress=None):
             _train(world, config, training)
 
     arguments = {"episodes": episodes, "snapshots": snapshots, "progress": progress}
-    return train_seeds(train, seeds=one_seed_of(env, seeds), **arguments)
+    seeds = one_seed_of(env, seeds)
+    return train_seeds(train, seeds=seeds, env=env, config=config, **arguments)
