@@ -102,6 +102,7 @@ def chapter(name):
     return cells, BLOCK.findall(shown)
 
 
+@pytest.mark.filterwarnings("ignore")  # what other libraries say of themselves
 @pytest.mark.parametrize("real", [False, True])
 def test_results_travel(real, elsewhere, monkeypatch):
     """To CSV, to rliable's matrices and to a data set of Minari's, in ten lines each."""
