@@ -12,8 +12,8 @@
 `play` is the loop and `TorchLearner` the learner. A terminal s' has no value; a step cut short by a
 cap is bootstrapped.
 
-Sources: V. Mnih et al. (2015), Human-level control through deep reinforcement learning; R. S.
-Sutton and A. G. Barto, Reinforcement Learning: An Introduction (2018), sections 6.5 and 16.5.
+Sources: V. Mnih et al. (2015), Human-level control through deep reinforcement learning; Sutton and
+Barto, Reinforcement Learning: An Introduction (2018), sections 6.5 and 16.5.
 """
 
 import math
@@ -27,43 +27,20 @@ from typing import Any, Literal, Self
 import numpy as np
 import torch
 from numba.extending import register_jitable
-from numpy.typing import NDArray
 
-from rl_core import modules
-from rl_core.checks import (
-    fields,
-    in_memory,
-    instance,
-    integer,
-    number,
-    one_of,
-    optional,
-    positive,
-    truth,
-)
+from rl_core import checks, modules
+from rl_core.checks import instance, integer, optional
 from rl_core.exploration import Epsilon, HalfWay, Linear, check_epsilon, schedule_state
-from rl_core.kernels import networks, q_update
+from rl_core.kernels import networks, q_update, replay
+from rl_core.kernels.arrays import F32, F64, Arrays
 from rl_core.kernels.choices import VALUE, after_copy, after_goal, after_step, greedy_action
 from rl_core.kernels.compiled import compiled
 from rl_core.kernels.q_update import ACTION, COPIES, KEPT, STEPS, UPDATES, Learner, Settings
-from rl_core.kernels.replay import (
-    Memory,
-    bytes_a_transition,
-    make_memory,
-    sample,
-    scaled,
-    store,
-)
+from rl_core.kernels.replay import Memory, sample, store
 from rl_core.policies import MLP, Network, check_network
 from rl_core.training import Progress, Run, Training, spawn_streams, train_seeds
-from rl_core.worlds.environments import (
-    EnvironmentLike,
-    TaskWorld,
-    World,
-    one_seed_of,
-    open_world,
-    step,
-)
+from rl_core.worlds import environments
+from rl_core.worlds.environments import EnvironmentLike, TaskWorld, World, open_world, step
 from rl_core.worlds.shaping import Shaping, shape_for, shaped_reward
 
 WENT_ON, DIVERGED, SHAPED_NAN = range(3)
@@ -88,22 +65,20 @@ class DQNConfig:
         Transitions an update, and transitions kept, at least a batch. As many as a batch: no
         replay, only the latest ones. Observations that are bytes are kept as bytes.
     learning_starts, update_every : int
-        Environment steps before the first update (the report waits until the memory is full), and
-        from one to the next.
+        Environment steps before the first update, and from one to the next.
     copy_every : int
         Updates between two copies to the fixed network. 1: no fixed target.
     epsilon : float, Linear or HalfWay
         Probability that a run of one random action begins, where none is going on (the report's
         epsilon is 1 minus it). A schedule is by the environment step.
     persistence : int
-        Steps p of such a run, at most to the end of the episode. 1: the usual epsilon-greedy. Else
-        the share of random steps is larger, p epsilon / (p epsilon + 1 - epsilon) (W. Dabney et al.
-        2021, Temporally-extended epsilon-greedy exploration).
+        Steps p of such a run, at most to the end of the episode. The share of random steps is then
+        p epsilon / (p epsilon + 1 - epsilon). 1: the usual epsilon-greedy. (W. Dabney et al. 2021,
+        Temporally-extended epsilon-greedy exploration.)
     shaping : Shaping or None
         What is learned from in place of the environment's reward. None: that reward.
     bootstrap_through_end : bool
-        Whether terminal states are given the value the network puts on them, as in the 2018
-        program, which kept no terminal flag. False is right.
+        Whether terminal states keep the network's value, as in 2018, without a terminal flag.
     max_episode_steps, max_env_steps : int or None
         Where to stop an episode that has not ended, and a whole seed. None: nowhere.
     engine : {"compiled", "torch"} or None
@@ -140,56 +115,45 @@ class DQNConfig:
 
     def __post_init__(self) -> None:
         counts = ("batch_size", "learning_starts", "update_every", "copy_every", "persistence")
-        fields(
+        checks.fields(
             self,
-            gamma=(number, 0, 1),
+            gamma=(checks.number, 0, 1),
             network=(instance, Network, "MLP(...) or Module('module:function')"),
-            optimiser=(one_of, ("rmsprop", "adam")),
-            learning_rate=(positive,),
+            optimiser=(checks.one_of, ("rmsprop", "adam")),
+            learning_rate=(checks.positive,),
             epsilon=(check_epsilon,),
             shaping=(optional, instance, Shaping, "Shaping('module:function')"),
-            bootstrap_through_end=(truth,),
+            bootstrap_through_end=(checks.truth,),
             max_episode_steps=(optional, integer, 1),
             max_env_steps=(optional, integer, 1),
             **dict.fromkeys(counts, (integer, 1)),
         )
-        fields(self, memory_size=(integer, self.batch_size))
+        checks.fields(self, memory_size=(integer, self.batch_size))
         object.__setattr__(self, "engine", check_network(self.network, self.engine))
 
     @classmethod
     def report_2018(cls, **changes: Any) -> Self:
-        """Return the report's settings for Acrobot, but with a terminal flag; changed as said.
+        """Return the report's settings for Acrobot, with a terminal flag; changed as said.
 
-        Its epsilon moves with the episodes that reach a goal: where every episode ends, as on
-        CartPole, exploration is over before anything is learned.
+        Epsilon moves with the goals reached: too fast where every episode ends, as on CartPole.
         """
-        report: dict[str, Any] = {
-            "network": MLP((10, 20), biases=False),
-            "optimiser": "rmsprop",
-            "batch_size": 512,
-            "memory_size": 3_000,
-            "learning_starts": 3_000,
-            "copy_every": 300,
-            "epsilon": HalfWay(0.9, 0.1),
-        }
+        report: dict[str, Any] = {"network": MLP((10, 20), biases=False), "optimiser": "rmsprop"}
+        report |= {"batch_size": 512, "memory_size": 3_000, "learning_starts": 3_000}
+        report |= {"copy_every": 300, "epsilon": HalfWay(0.9, 0.1)}
         return cls(**(report | changes))
 
 
 class TorchLearner:
-    """DQN as its equation says, for any network; `Learner` is its compiled counterpart.
+    """DQN as its equation says, for any network Q(s, .; theta); `Learner` is its compiled form.
 
     Parameters
     ----------
     network : torch.nn.Module
-        Q(s, .; theta).
     settings : Settings
-    epsilon : float64 array
-        State of the schedule of epsilon.
+    epsilon : float64 array, the state of its schedule
     """
 
-    def __init__(
-        self, network: torch.nn.Module, settings: Settings, epsilon: NDArray[np.float64]
-    ) -> None:
+    def __init__(self, network: torch.nn.Module, settings: Settings, epsilon: F64) -> None:
         self.network, self.fixed = network, deepcopy(network)
         self.settings, self.epsilon = settings, epsilon
         self.counts = np.zeros(5, np.int64)
@@ -203,7 +167,7 @@ class TorchLearner:
 
         y = r + gamma max_a' Q(s', a'; theta-), or r if s' is terminal.
         """
-        s, s_next = (torch.from_numpy(scaled(array[self.slots])) for array in memory[:2])
+        s, s_next = (torch.from_numpy(replay.scaled(array[self.slots])) for array in memory[:2])
         a, r, end = (torch.from_numpy(array[self.slots]) for array in memory[2:5])
         with torch.no_grad():
             y = r + self.settings.gamma * self.fixed(s_next).amax(1)
@@ -214,10 +178,7 @@ class TorchLearner:
         return loss
 
     def update(self, memory: Memory) -> bool:
-        """Take one step of the optimiser, and copy the network when it is time.
-
-        Returns False, and changes nothing, if the loss is not finite.
-        """
+        """Take a step of the optimiser, and copy when it is time; not if the loss is not finite."""
         loss = self.loss(memory)
         if not torch.isfinite(loss):
             return False
@@ -231,7 +192,7 @@ class TorchLearner:
             after_copy(self.epsilon)
         return True
 
-    def q_values(self, observation: NDArray[np.float32]) -> NDArray[np.float64]:
+    def q_values(self, observation: F32) -> F64:
         """Q(s, .; theta) of one state."""
         with torch.no_grad():
             values: torch.Tensor = self.network(torch.from_numpy(observation)[None])[0]
@@ -239,7 +200,7 @@ class TorchLearner:
 
 
 @register_jitable
-def act(learner: Any, observation: NDArray[np.float32], u: float, v: float) -> int:
+def act(learner: Any, observation: F32, u: float, v: float) -> int:
     """Act epsilon-greedily; a random action is kept for `persistence` steps.
 
     Of the uniforms u, v in [0, 1), u decides whether to explore, v picks among random or tied
@@ -274,16 +235,15 @@ def play(
     learner: Any,
     memory: Memory,
     shape: Any,
-    observation: NDArray[np.float32],
+    observation: F32,
     policy_rng: np.random.Generator,
     replay_rng: np.random.Generator,
     max_steps: int,
 ) -> tuple[int, float, bool, int]:
     """Play and learn from one episode; `observation`, its first, is overwritten.
 
-    Plain Python as it stands, for any world and network; `_play_compiled` is the same text for
-    compiled tasks and perceptrons. Returns the steps, the sum of the environment's own rewards,
-    whether the episode terminated, and how the learning went.
+    Plain Python for any world and network; `_play_compiled` is the same text for compiled tasks and
+    perceptrons. Returns steps, return, whether it terminated, and how the learning went.
     """
     settings, counts = learner.settings, learner.counts
     following, action = np.empty_like(observation), np.empty(1, np.float32)
@@ -315,10 +275,11 @@ _play_compiled = compiled(play)
 
 def _make_learner(
     config: DQNConfig, world: World, rng: np.random.Generator
-) -> tuple[Learner | TorchLearner, Callable[[], dict[str, NDArray[Any]]]]:
+) -> tuple[Learner | TorchLearner, Callable[[], Arrays]]:
     """Draw the initial weights; return who learns them, and what gives them by name."""
     if world.n_actions == 0:
         raise ValueError("env must have a Discrete action space, got a Box")
+    replay.check_room("memory_size", config.memory_size, world.n_observations, world.as_bytes)
     same = {name: getattr(config, name) for name in Settings._fields if hasattr(config, name)}
     adam, through_end = config.optimiser == "adam", config.bootstrap_through_end
     settings = Settings(**same, adam=adam, through_end=through_end, n_actions=world.n_actions)
@@ -330,7 +291,7 @@ def _make_learner(
     biases = config.network.biases
     parameters = networks.xavier_uniform(sizes, rng)
 
-    def layers() -> dict[str, NDArray[Any]]:
+    def layers() -> Arrays:
         named = networks.unpack(sizes, parameters)
         return {name: array for name, array in named.items() if biases or "bias" not in name}
 
@@ -342,12 +303,11 @@ def _make_learner(
 
 def _train(world: World, config: DQNConfig, training: Training) -> None:
     """Train one seed."""
-    _check_memory(config, world)
     streams = spawn_streams(training.seed)
     world.seed(streams.environment_seed)
     learner, arrays = _make_learner(config, world, streams.network)
     training.keep("initial/", arrays())
-    memory = make_memory(config.memory_size, world.n_observations, as_bytes=world.as_bytes)
+    memory = replay.make_memory(config.memory_size, world.n_observations, as_bytes=world.as_bytes)
     shape = shape_for(config.shaping, world.n_observations)
     rngs = streams.policy, streams.replay
     both = isinstance(world, TaskWorld) and isinstance(learner, Learner)
@@ -381,15 +341,8 @@ def check_dqn(env: EnvironmentLike, config: DQNConfig) -> None:
     """
     instance("config", config, DQNConfig, "a DQNConfig")
     with closing(open_world(env)) as world:
-        _check_memory(config, world)
         _make_learner(config, world, np.random.default_rng(0))
         shape_for(config.shaping, world.n_observations)
-
-
-def _check_memory(config: DQNConfig, world: World) -> None:
-    """Raise if the machine cannot hold the replay memory, of which zeros take no room at first."""
-    each = bytes_a_transition(world.n_observations, as_bytes=world.as_bytes)
-    in_memory("memory_size", config.memory_size, config.memory_size * each)
 
 
 def dqn(
@@ -442,6 +395,6 @@ def dqn(
         with closing(open_world(env)) as world, modules.reproducible(training.seed):
             _train(world, config, training)
 
-    seeds = one_seed_of(env, seeds)
+    seeds = environments.one_seed_of(env, seeds)
     told: Any = {"progress": progress, "env": env, "config": config}
     return train_seeds(train, episodes=episodes, seeds=seeds, snapshots=snapshots, **told)

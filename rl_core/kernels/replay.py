@@ -18,6 +18,7 @@ from numba.core.types import uint8
 from numba.extending import overload
 from numpy.typing import NDArray
 
+from rl_core.checks import in_memory
 from rl_core.kernels.arrays import F32, F64, I64, Bools, Bytes
 from rl_core.kernels.compiled import compiled
 
@@ -68,6 +69,17 @@ def bytes_a_transition(n_observations: int, *, as_bytes: bool = False) -> int:
     (61, 61)
     """
     return sum(array.nbytes for array in make_memory(1, n_observations, as_bytes=as_bytes)[:-1])
+
+
+def check_room(name: str, capacity: int, n_observations: int, as_bytes: bool) -> None:
+    """Raise if the machine cannot hold such a memory, whose zeros take no room at first.
+
+    Examples
+    --------
+    >>> from rl_core.kernels.replay import check_room
+    >>> check_room("memory_size", 3000, 6, False)
+    """
+    in_memory(name, capacity, capacity * bytes_a_transition(n_observations, as_bytes=as_bytes))
 
 
 def make_memory(capacity: int, n_observations: int, *, as_bytes: bool = False) -> Memory:
