@@ -257,7 +257,7 @@ AMENDMENTS = [
         "sentences of chapter 4",
         "two criteria: whether another step size does for the discount of 0.99 what 0.9 does",
         True,
-        "see chapter 4",
+        "both met: what chapter 4 says of the discount",
         "seeds 100 to 129",
     ),
     Amendment(
