@@ -78,13 +78,18 @@ class Visit:
         page.set_default_timeout(120_000)  # milliseconds: for a machine that is busy
         page.on("console", self._console)
         page.on("pageerror", lambda error: self.problems.append(f"error: {error}"))
-        page.on("requestfailed", lambda request: self.problems.append(f"failed: {request.url}"))
+        page.on("requestfailed", self._failed)
         page.on("response", self._response)
         page.route(lambda url: not url.startswith((address, "data:", "blob:")), self._outside)
 
     def _console(self, message) -> None:
         if message.type in ("error", "warning"):
             self.problems.append(f"console: {message.text}")
+
+    def _failed(self, request) -> None:
+        # Of a film no more than its beginning is loaded before it is played.
+        if (request.resource_type, request.failure) != ("media", "net::ERR_ABORTED"):
+            self.problems.append(f"failed: {request.url}")
 
     def _response(self, response) -> None:
         if response.status >= 400:
@@ -99,7 +104,7 @@ class Visit:
         self.problems.clear()
         self.page.goto(f"{self.address}/{path}", wait_until="networkidle")
         self.page.wait_for_function(
-            "() => !window.MathJax || MathJax.startup?.promise?.then(() => true)"
+            "() => !window.MathJax || document.documentElement.dataset.formulas === 'set'"
         )
         return self
 

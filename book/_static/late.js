@@ -13,7 +13,19 @@
     if (!formulas) return;
     const script = document.createElement("script");
     script.src = formulas.content;
-    script.onload = () => MathJax.startup.promise.then(land);
+    script.onload = async () => {
+      await MathJax.startup.promise;
+      // What is in sight or above it at once; below, one by one: the page can be used meanwhile.
+      const all = [...document.querySelectorAll(".math")];
+      const below = all.filter((it) => it.getBoundingClientRect().top > innerHeight);
+      for (const some of [all.filter((it) => !below.includes(it)), ...below.map((it) => [it])]) {
+        await MathJax.typesetPromise(some);
+        await new Promise((done) => setTimeout(done));
+      }
+      document.documentElement.dataset.formulas = "set";
+      land();
+    };
+    MathJax.startup = { typeset: false };
     document.head.append(script);
   };
   addEventListener("load", () => {
