@@ -54,8 +54,7 @@ POINTS = (1, *range(EVERY, EPISODES + 1, EVERY))
 def curve_data(curves: Curves, arms: Sequence[str]) -> pd.DataFrame:
     """What the curves are drawn from: each seed's median of the last 100 episodes.
 
-    Of the points the first and every tenth. A seed that its budget cut while it still got out keeps
-    its last value, as in the medians drawn.
+    Of the points the first and every tenth.
     """
     tables = []
     for arm in arms:
@@ -100,8 +99,7 @@ def every_seed(
     curves: Curves, results: Results, arm: str, title: str, original: pd.DataFrame
 ) -> Widget:
     """An arm's panel as a figure that answers; with films of single seeds, if as reported."""
-    smooth = curves.smooth[arm].copy()
-    smooth[np.arange(1, EPISODES + 1) > curves.ends[arm][:, None]] = np.nan
+    smooth = curves.smooth[arm]
     x = np.array(POINTS)
     arrays, config = results.arrays(arm), study.config(arm)
     agents = shown_agents(
