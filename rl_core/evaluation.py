@@ -17,6 +17,7 @@ from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from rl_core import modules
-from rl_core.checks import floats, generator, instance, integer, number, require
+from rl_core.checks import floats, generator, instance, integer, number, require, truth
 from rl_core.dqn import DQNConfig
 from rl_core.identity import canonical_json, describe, restored
 from rl_core.kernels import likelihood, networks
@@ -151,12 +152,13 @@ class Agent:
         >>> agent.predict(np.ones(1)), agent.predict(np.ones((2, 1)))[0]
         ((np.int64(1), None), array([1, 1]))
         """
-        actor = self._greedy if deterministic else self.actor
+        actor = self._greedy if truth("deterministic", deterministic) else self.actor
         policy, n_seen = actor.policy, _observed(actor)
         shape = (n_seen,) if self.spaces is None else self.spaces[0].shape
         seen = np.asarray(observation)
-        fits = seen.shape == shape or seen.shape[1:] == shape
-        require(fits, "observation", seen.shape, f"of shape {shape}, or a batch of such")
+        fits = seen.dtype.kind in "fiub" and shape in (seen.shape, seen.shape[1:])
+        allowed = f"numbers of shape {shape}, or a batch of such"
+        require(fits, "observation", f"{seen.dtype} of shape {seen.shape}", allowed)
         first = seen.reshape(-1, n_seen).astype(np.float32)
         if (seen if self.spaces is None else self.spaces[0]).dtype == np.uint8:
             first *= BYTE
@@ -175,7 +177,10 @@ class Agent:
         ------
         ValueError
             The agent is not of a run, so there is no configuration.
+        OSError
+            The file cannot be written.
         """
+        path = instance("path", path, str | Path, "a str or Path")
         require(self.config is not None and self.spaces, "agent", self, "one of a run, to be saved")
         assert self.spaces is not None
         env = self.env if isinstance(self.env, str | Make) else None
@@ -221,6 +226,8 @@ class Agent:
             The extra `render` is not installed.
         TypeError, ValueError
             The environment cannot be drawn, or an argument is not as described.
+        OSError
+            The film cannot be written.
         """
         try:
             import imageio_ffmpeg
@@ -228,6 +235,7 @@ class Agent:
             raise ImportError(
                 "a film needs the extra 'render': pip install imageio-ffmpeg pygame"
             ) from error
+        path = instance("path", path, str | Path, "a str or Path")
         seed, max_steps = integer("seed", seed), integer("max_steps", max_steps, 1)
         with closing(_drawn(self.env if env is None else env)) as world:
             observation, _ = world.reset(seed=seed)
@@ -264,8 +272,9 @@ def load(path: str | Path, rng: np.random.Generator | None = None) -> Agent:
 
     Raises
     ------
-    FileNotFoundError
-    ValueError
+    OSError
+        The file cannot be read.
+    TypeError, ValueError
         The file is damaged or another, or names a class or network that is not to be found.
 
     Examples
@@ -281,8 +290,9 @@ def load(path: str | Path, rng: np.random.Generator | None = None) -> Agent:
     >>> agent.config == ReinforceConfig()
     True
     """
+    content = Path(instance("path", path, str | Path, "a str or Path")).read_bytes()
     try:
-        with np.load(io.BytesIO(Path(path).read_bytes()), allow_pickle=False) as file:
+        with np.load(io.BytesIO(content), allow_pickle=False) as file:
             arrays = dict(file)
         about = json.loads(str(arrays["about"]))
         require(about["format"] == FORMAT, "format", about["format"], FORMAT)
@@ -297,8 +307,6 @@ def load(path: str | Path, rng: np.random.Generator | None = None) -> Agent:
         kept = [name for name in arrays if name.startswith("weights ")]
         weights = {name.partition(" ")[2]: arrays[name] for name in kept}
         agent = as_learned(config, weights, spaces=(found[0], found[1]), env=env)
-    except FileNotFoundError:
-        raise
     except Exception as error:  # whatever a damaged file makes of zipfile, numpy and json
         raise ValueError(
             f"path must be a file that Agent.save wrote, got {str(path)!r}: {error}"
@@ -745,23 +753,23 @@ def _native(actions: NDArray[np.float32], policy: Policy, found: Spaces | None) 
 
 def _drawn(env: Any) -> gymnasium.Env[Any, Any]:
     """Open an environment that draws itself, with the time limit that it is played with here."""
-    found = find(env) if isinstance(env, str) else env
     picture: dict[str, Any] = {"render_mode": "rgb_array"}
-    if isinstance(env, str) and found is None:
-        task = twin(env)
-        limit: dict[str, Any] = (
-            {} if task is None else {"max_episode_steps": task.max_episode_steps or -1}
-        )
-        made: Any = gymnasium.make(env, **picture, **limit)
-    elif isinstance(env, Make):
-        made = gymnasium.make(env.id, **{**env.arguments, **picture})
-    elif callable(found) and not isinstance(found, gymnasium.Env):
-        try:
-            made = found(**picture)
-        except TypeError:  # it takes no arguments
-            made = found()
-    else:
-        made = found
+    found = find(env) if isinstance(env, str) else env
+    try:
+        if isinstance(env, str) and found is None:
+            if (task := twin(env)) is not None:
+                picture["max_episode_steps"] = task.max_episode_steps or -1
+            made: Any = gymnasium.make(env, **picture)
+        elif isinstance(env, Make):
+            made = gymnasium.make(env.id, **{**env.arguments, **picture})
+        elif callable(found) and not isinstance(found, gymnasium.Env):
+            taken = signature(found).parameters
+            others = any(one.kind is one.VAR_KEYWORD for one in taken.values())
+            made = found(**picture) if "render_mode" in taken or others else found()
+        else:
+            made = found
+    except (gymnasium.error.Error, TypeError, ValueError) as error:
+        raise ValueError(f"env must be one that can be drawn, got {env!r}: {error}") from error
     draws = isinstance(made, gymnasium.Env) and made.render_mode == "rgb_array"
     require(draws, "env", env, "an environment of Gymnasium's with render_mode='rgb_array'")
     film: gymnasium.Env[Any, Any] = made

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from report.seeds import FULL, SEEDS
-from rl_core.evaluation import as_learned, evaluate, evaluate_table
+from rl_core.evaluation import as_learned, evaluate, of_table
 from rl_core.experiments import Arm, Results, run
 from rl_core.q_learning import q_learning
 from rl_core.statistics import bootstrap_interval
@@ -68,7 +68,9 @@ def mean_steps(cars: Results, acrobot: Results) -> dict[str, np.ndarray]:
             levels = first.LEVELS[first.environment_of(arm.name)]
             world = gridded(arm.env, arm.config.bins, levels=levels)
             tables = zip(results.arrays(arm.name)["Q"], seeds, strict=True)
-            played = [evaluate_table(world, Q, seed=seed, **rules) for Q, seed in tables]
+            played = [
+                evaluate(arm.env, of_table(world, Q), seed=seed, **rules) for Q, seed in tables
+            ]
             found[arm.name] = np.array([one["steps"].mean() for one in played])
     network, arrays = arms_of_acrobot()[1], acrobot.arrays("Acrobot, as reported")
     agents = [as_learned(network.config, weights_of(arrays, i)) for i in range(len(OF_ANGLES))]
