@@ -200,7 +200,7 @@ def test_what_cannot_be_held_is_refused():
     with pytest.raises(ValueError, match=r"^agent must be one of a run, to be saved, got Agent"):
         uniform(2, 3).save("nowhere.npz")
     with pytest.raises(
-        ValueError, match=r"^observation must be numbers of shape \(2,\), or a batch"
+        ValueError, match=r"^observation must be numbers of shape \(2,\), "
     ):
         uniform(2, 3).predict(np.zeros(3))
     run = reinforce("CartPole-v1", ReinforceConfig(**CUT), episodes=1, seeds=[0])
