@@ -199,9 +199,7 @@ print(load({str(path)!r}).predict([0.0, 0.0, 0.1, 0.0], deterministic=True)[0])
 def test_what_cannot_be_held_is_refused():
     with pytest.raises(ValueError, match=r"^agent must be one of a run, to be saved, got Agent"):
         uniform(2, 3).save("nowhere.npz")
-    with pytest.raises(
-        ValueError, match=r"^observation must be numbers of shape \(2,\), "
-    ):
+    with pytest.raises(ValueError, match=r"^observation must be numbers of shape \(2,\), "):
         uniform(2, 3).predict(np.zeros(3))
     run = reinforce("CartPole-v1", ReinforceConfig(**CUT), episodes=1, seeds=[0])
     bare = Run(run.table, run.arrays)
