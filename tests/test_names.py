@@ -141,3 +141,14 @@ def test_arguments_are_json(arguments):
 def test_makes_are_values():
     assert hash(Make(ID, {"a": 1})) == hash(Make(ID, {"a": 1}))
     assert Make(ID, {"a": 1}) == Make(ID, {"a": 1}) != Make(ID)
+
+
+def test_an_id_comes_before_what_a_module_has(lab):
+    """An id may look like a name (no version), and none like an id is looked for in a module."""
+    assert find("names_lab:Cart").__name__ == "Cart"
+    gymnasium.register("Cart", entry_point="names_lab:Cart")
+    try:
+        assert find("names_lab:Cart") is None
+    finally:
+        gymnasium.registry.pop("Cart")
+    assert find("names_lab:Cart-v9") is None

@@ -59,7 +59,7 @@ def test_streams_differ_from_each_other_and_between_seeds():
 
 def test_a_row_an_episode_with_the_columns_agreed():
     table = train_seeds(walk, episodes=3, seeds=[4, 2]).table
-    assert {name: str(dtype) for name, dtype in table.dtypes.items()} == COLUMNS
+    assert [(name, str(dtype)) for name, dtype in table.dtypes.items()] == list(COLUMNS.items())
     assert table["seed"].tolist() == [4, 4, 4, 2, 2, 2]
     assert table["episode"].tolist() == [1, 2, 3] * 2
     np.testing.assert_array_equal(table["env_steps"], table.groupby("seed")["steps"].cumsum())
