@@ -15,9 +15,7 @@ from numbers import Integral, Real
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import ArrayLike
-
-from rl_core.kernels.arrays import F64
+from numpy.typing import ArrayLike, NDArray
 
 LARGEST_INTEGER = 2**63 - 1
 """The largest integer that tables, compiled code and the store can hold."""
@@ -210,7 +208,7 @@ def generator(name: str, value: object) -> np.random.Generator:
 
 def floats(
     name: str, values: ArrayLike, shape: tuple[int | None, ...], *, finite: bool = True
-) -> F64:
+) -> NDArray[np.float64]:
     """Return an array of numbers as float64 (a copy), if it has the shape; None is any length.
 
     Infinities are let through if `finite` is false; NaN never is.

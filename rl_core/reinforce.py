@@ -172,7 +172,7 @@ def log_probability(
 
     Examples
     --------
-    >>> policy = make_policy(Categorical(), (), 1, 2, 0)
+    >>> policy = policies.make_policy(Categorical(), (), 1, 2, 0)
     >>> y, s, a = torch.zeros(1, 2), torch.ones(1, 1), torch.ones(1, 1)
     >>> round(float(log_probability(policy, y, s, a, torch.zeros(0)).exp()), 3)
     0.5
