@@ -103,7 +103,7 @@ criteria = pd.read_csv(RESULTS / "criteria.csv")
 counted = chance(criteria)
 glue("criteria", counted.criteria, display=False)
 glue("random", counted.random, display=False)
-glue("by-chance", float(counted.by_chance), display=False)
+glue("by-chance", counted.by_chance, display=False)
 glue("failed", counted.failed, display=False)
 glue("near", len(counted.near), display=False)
 captioned(

@@ -332,6 +332,7 @@ def weights_of(
     """
     instance("arrays", arrays, Mapping, "a mapping of names to arrays")
     instance("moment", moment, str, "a text")
+    require(all(isinstance(name, str) for name in arrays), "arrays", list(arrays), "named by texts")
     names = [name for name in arrays if name.rpartition("/")[0] == moment.rstrip("/")]
     if not names:
         raise ValueError(

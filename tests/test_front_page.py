@@ -144,4 +144,5 @@ def test_a_thumbnail_shows_the_first_arm_of_a_figure_with_several(tmp_path):
 def test_every_chapter_has_its_page():
     book = Path(front_page.__file__).parent.parent
     notebooks = {path.stem for path in book.glob("[0-9]*.ipynb")}
-    assert notebooks == set(front_page.PAGES.values())
+    own = "07_take_it_from_here"  # no claim of the report stands there
+    assert notebooks == {*front_page.PAGES.values(), own}

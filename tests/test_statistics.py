@@ -474,7 +474,10 @@ def test_an_arm_without_rows_has_empty_curves():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"column": "reward"}, r"table must be with the columns \['reward'\] too, got \['seed', "),
+        (
+            {"column": "reward"},
+            r"table must be with the columns \['reward'\] too, where .*, got \['seed'",
+        ),
         ({"window": 0}, "window must be an integer from 1, got 0"),
         ({"average": "max"}, "average must be one of 'median', 'mean', got 'max'"),
         ({"seeds": [1]}, r"seeds must be all that the table has, \[0\] too"),

@@ -64,7 +64,7 @@ def chance(criteria: pd.DataFrame) -> Chance:
     return Chance(
         len(criteria),
         int(random.sum()),
-        random.sum() / 20,
+        int(random.sum()) / 20,
         int((random & (criteria["answer"] == "no")).sum()),
         table,
     )

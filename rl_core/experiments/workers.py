@@ -1,5 +1,6 @@
 """What a worker does: train one seed of one arm and store the result."""
 
+import importlib
 import os
 import sys
 import threading
@@ -117,9 +118,9 @@ def use_threads(count: int) -> int:
     Each worker gets one thread: there are as many of them as cores, and the number of threads may
     change the order in which torch sums, hence the bits.
     """
-    torch = sys.modules.get("torch")
-    if torch is None:
+    if "torch" not in sys.modules:
         return 1
+    torch = importlib.import_module("torch")  # waits where another thread is loading it
     before: int = torch.get_num_threads()
     torch.set_num_threads(count)
     return before

@@ -210,9 +210,12 @@ def checked_reward(env: object, reward: Any) -> float:
     """
     single = isinstance(reward, np.ndarray) and reward.size == 1
     number = reward.item() if single or isinstance(reward, np.generic) else reward
-    if not isinstance(number, Real):
-        raise ValueError(f"env must pay a number as reward, from {env}, came {reward!r}")
-    return float(number)
+    try:
+        if isinstance(number, Real):
+            return float(number)
+    except OverflowError:  # an integer that no float holds
+        pass
+    raise ValueError(f"env must pay a number as reward, from {env}, came {reward!r}")
 
 
 def step(stepper: Kernel | GymnasiumWorld, action: F32, following: F32) -> tuple[float, bool, bool]:
