@@ -137,6 +137,18 @@ def linked(text: str) -> str:
     return re.sub(r"((?:Figure|Table|Film)s? )?(S?\d+(?:\.\d+)?)", link, html.escape(text))
 
 
+def _first(figures: str) -> str:
+    """Of several figures the first; a range is one.
+
+    Examples
+    --------
+    >>> _first("Figures 9, S2.1"), _first("Figures 1-8, Table 1.2")
+    ('Figure 9', 'Figures 1-8')
+    """
+    first = figures.split(",")[0]
+    return first if "-" in first or "–" in first else first.replace("Figures", "Figure")
+
+
 def findings_list(findings: Sequence[Told]) -> str:
     """The findings as an ordered list of HTML, each with the figure to look at."""
     items = "".join(f"<li>{one.sentence} {linked(one.figure)}</li>" for one in findings)
@@ -192,7 +204,7 @@ def _row(row: pd.Series) -> str:
         "claim of 2018": claim,
         "verdict": _verdict(row["verdict"]),
         "measured": f"<b>{judged.number(decided.estimate)}</b>{interval}",
-        "see": linked(row["figure"].split(",")[0]),
+        "see": linked(_first(row["figure"])),
     }
     return "<tr>" + "".join(f'<td data-label="{k}">{v}</td>' for k, v in cells.items()) + "</tr>"
 
