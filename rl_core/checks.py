@@ -26,6 +26,7 @@ def require(condition: object, name: str, value: object, allowed: str) -> None:
 
     Examples
     --------
+    >>> from rl_core.checks import require
     >>> require(False, "gamma", 2, "a number from 0 to 1")
     Traceback (most recent call last):
     ValueError: gamma must be a number from 0 to 1, got 2
@@ -39,6 +40,8 @@ def instance(name: str, value: object, kinds: Any, allowed: str) -> Any:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.checks import instance
     >>> instance("rng", 7, np.random.Generator, "a numpy.random.Generator")
     Traceback (most recent call last):
     TypeError: rng must be a numpy.random.Generator, got 7
@@ -53,6 +56,8 @@ def integer(name: str, value: object, least: int = 0, most: int = LARGEST_INTEGE
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.checks import integer
     >>> integer("episodes", np.uint8(200), least=1)
     200
     >>> integer("episodes", 0, least=1)
@@ -85,6 +90,8 @@ def number(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.checks import number
     >>> number("gamma", np.float32(0.5), 0, 1)
     0.5
     >>> number("learning_rate", 0, above=0)
@@ -128,6 +135,8 @@ def truth(name: str, value: object) -> bool:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.checks import truth
     >>> truth("biases", np.True_)
     True
     """
@@ -141,6 +150,7 @@ def one_of(name: str, value: object, words: Collection[str]) -> str:
 
     Examples
     --------
+    >>> from rl_core.checks import one_of
     >>> one_of("engine", "jax", ("compiled", "torch"))
     Traceback (most recent call last):
     ValueError: engine must be one of 'compiled', 'torch', got 'jax'
@@ -157,6 +167,7 @@ def optional(name: str, value: object, check: Callable[..., Any], *bounds: Any) 
 
     Examples
     --------
+    >>> from rl_core.checks import integer, optional
     >>> optional("limit", None, integer, 1), optional("limit", 5, integer, 1)
     (None, 5)
     """
@@ -176,6 +187,8 @@ def integers(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.checks import integers
     >>> integers("seeds", np.arange(3))
     (0, 1, 2)
     """
@@ -190,6 +203,7 @@ def distinct_seeds(seeds: object) -> tuple[int, ...]:
 
     Examples
     --------
+    >>> from rl_core.checks import distinct_seeds
     >>> distinct_seeds(range(3))
     (0, 1, 2)
     """
@@ -215,6 +229,8 @@ def floats(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.checks import floats
     >>> floats("V", [1, 2], (2,))
     array([1., 2.])
     >>> floats("V", [1.0, np.nan], (None,))
@@ -253,6 +269,7 @@ def in_memory(name: str, value: object, room: int) -> None:
 
     Examples
     --------
+    >>> from rl_core.checks import in_memory
     >>> in_memory("bins", 10**6, 2**80)
     Traceback (most recent call last):
     ValueError: bins must be less: it would take 1,125,899,906,842,624.0 GiB of memory, and...
@@ -281,6 +298,8 @@ def fields(config: object, **rules: tuple[Any, ...]) -> None:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.checks import fields, number
     >>> from dataclasses import dataclass
     >>> @dataclass(frozen=True)
     ... class Settings:

@@ -43,6 +43,7 @@ class Linear:
 
     Examples
     --------
+    >>> from rl_core.exploration import Linear
     >>> Linear(0.9, 0.1, episodes=4).values(6).round(3).tolist()
     [0.9, 0.7, 0.5, 0.3, 0.1, 0.1]
     >>> Linear(1.0, 0.1, steps=10_000).steps
@@ -87,6 +88,7 @@ class Geometric:
 
     Examples
     --------
+    >>> from rl_core.exploration import Geometric
     >>> Geometric(0.8, 0.1, episodes=3).values(5).round(3).tolist()
     [0.8, 0.4, 0.2, 0.1, 0.1]
     """
@@ -124,6 +126,7 @@ class HalfWay:
 
     Examples
     --------
+    >>> from rl_core.exploration import HalfWay, schedule_state
     >>> from rl_core.kernels.choices import AIM, VALUE, after_copy, after_goal
     >>> state = schedule_state(HalfWay(0.9, 0.1))
     >>> after_goal(state)
@@ -156,6 +159,7 @@ def schedule_state(epsilon: Epsilon) -> F64:
 
     Examples
     --------
+    >>> from rl_core.exploration import schedule_state
     >>> float(schedule_state(0.1)[0])
     0.1
     """
@@ -174,6 +178,7 @@ def check_epsilon(name: str, value: object) -> Epsilon:
 
     Examples
     --------
+    >>> from rl_core.exploration import Linear, check_epsilon
     >>> check_epsilon("epsilon", Linear(1, 0, episodes=5))
     Traceback (most recent call last):
     ValueError: epsilon must be a schedule by the environment step, got Linear(start=1.0, ...
@@ -213,6 +218,7 @@ class VisitDecay:
 
     Examples
     --------
+    >>> from rl_core.exploration import VisitDecay
     >>> VisitDecay(initial=1.0, exponent=0.6)
     VisitDecay(initial=1.0, exponent=0.6)
     """
@@ -243,6 +249,8 @@ class EpsilonGreedy:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.exploration import EpsilonGreedy
     >>> from rl_core.kernels.choices import choose
     >>> rule = EpsilonGreedy(epsilon=0.1)
     >>> q = np.array([0.0, 2.0, 2.0, 1.0])
@@ -281,6 +289,8 @@ class Softmax:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.exploration import Softmax
     >>> from rl_core.kernels.choices import choose
     >>> rule = Softmax(temperature=0.5)
     >>> q = np.array([0.0, 0.5 * np.log(3)])  # probabilities 1/4 and 3/4
@@ -313,6 +323,8 @@ class UnnormalisedSoftmax:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.exploration import UnnormalisedSoftmax
     >>> from rl_core.kernels.choices import choose
     >>> kind = UnnormalisedSoftmax().kind
     >>> choose(kind, 1.0, np.zeros(4), 0.99, 0.0)
@@ -355,6 +367,7 @@ class Trials:
 
     Examples
     --------
+    >>> from rl_core.exploration import Trials
     >>> Trials(every=100, epsilon=0)
     Trials(every=100, episodes=10, max_steps=100, epsilon=0.0)
     """
@@ -374,6 +387,7 @@ def values(parameter: float | Schedule, episodes: int) -> F64:
 
     Examples
     --------
+    >>> from rl_core.exploration import Linear, values
     >>> values(0.5, 3).tolist(), values(Linear(1, 0, episodes=2), 3).tolist()
     ([0.5, 0.5, 0.5], [1.0, 0.5, 0.0])
     """
@@ -389,6 +403,8 @@ def parameter_of(name: str, value: object, check: Any) -> Any:
 
     Examples
     --------
+    >>> from rl_core.checks import positive
+    >>> from rl_core.exploration import Linear, parameter_of
     >>> parameter_of("temperature", Linear(1, 0, episodes=9), positive)
     Traceback (most recent call last):
     ValueError: temperature.end must be a finite number above 0, got 0.0

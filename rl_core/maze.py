@@ -88,6 +88,7 @@ class Maze(OwnModel, gym.Env[int, int]):
 
     Examples
     --------
+    >>> from rl_core.maze import Maze
     >>> env = Maze()
     >>> env.observation_space, env.action_space
     (Discrete(112), Discrete(4))
@@ -166,6 +167,7 @@ class Maze(OwnModel, gym.Env[int, int]):
 
         Examples
         --------
+        >>> from rl_core.maze import Maze
         >>> env = Maze("SFG", slip=0)
         >>> env.reset()[0], env.step(3)[:3], env.step(3)[:3]  # right, and right again
         (0, (3, 0.0, False), (5, 1.0, True))
@@ -196,6 +198,7 @@ class Maze(OwnModel, gym.Env[int, int]):
 
         Examples
         --------
+        >>> from rl_core.maze import Maze
         >>> model = Maze().model()
         >>> model.successor[0, 1].tolist(), model.probability[0, 1].tolist()
         ([8, 0], [0.9, 0.1])
@@ -224,6 +227,7 @@ class Maze(OwnModel, gym.Env[int, int]):
 
         Examples
         --------
+        >>> from rl_core.maze import Maze
         >>> Maze().reachable_states().sum()
         np.int64(100)
         """
@@ -251,6 +255,7 @@ class Maze(OwnModel, gym.Env[int, int]):
 
         Examples
         --------
+        >>> from rl_core.maze import Maze
         >>> Maze().state(1, 4, "CAB")
         111
         """
@@ -278,6 +283,7 @@ class Maze(OwnModel, gym.Env[int, int]):
 
         Examples
         --------
+        >>> from rl_core.maze import Maze
         >>> Maze().locate(111)
         (1, 4, 'ABC')
         """
@@ -299,6 +305,7 @@ class Maze(OwnModel, gym.Env[int, int]):
 
         Examples
         --------
+        >>> from rl_core.maze import Maze
         >>> env = Maze("SFG", render_mode="ansi")
         >>> env.reset()[0]
         0
@@ -417,6 +424,8 @@ def random_maze(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.maze import random_maze
     >>> maze = random_maze(4, 6, flags=2, wall_fraction=0.25, rng=np.random.default_rng(1))
     >>> maze.observation_space
     Discrete(72)

@@ -94,6 +94,7 @@ class MDP:
     --------
     One state in which the only action pays 1 and ends the episode with probability 1/2:
 
+    >>> from rl_core.mdp import MDP
     >>> model = MDP(
     ...     successor=[[[0, 1]], [[1, 1]]],
     ...     probability=[[[0.5, 0.5]], [[0.5, 0.5]]],
@@ -167,6 +168,7 @@ class MDP:
 
         Examples
         --------
+        >>> from rl_core.mdp import MDP
         >>> MDP.from_env("FrozenLake-v1").reachable_states().all()
         np.True_
         """
@@ -183,6 +185,8 @@ class MDP:
 
         Examples
         --------
+        >>> import numpy as np
+        >>> from rl_core.mdp import MDP
         >>> MDP.from_env("FrozenLake-v1").following(np.full(16, 2)).successor.shape
         (16, 1, 3)
         """
@@ -233,6 +237,8 @@ class MDP:
 
         Examples
         --------
+        >>> import numpy as np
+        >>> from rl_core.mdp import MDP
         >>> lake = MDP.from_env("FrozenLake-v1")
         >>> lake.successor.shape, np.flatnonzero(lake.terminal).tolist()
         ((16, 4, 3), [5, 7, 11, 12, 15])
@@ -308,6 +314,7 @@ def checked_policy(name: str, policy: ArrayLike, mdp: MDP) -> NDArray[np.integer
 
     Examples
     --------
+    >>> from rl_core.mdp import MDP, checked_policy
     >>> checked_policy("policy", [4] * 16, MDP.from_env("FrozenLake-v1"))
     Traceback (most recent call last):
     ValueError: policy must be an array of integers from 0 to 3, in state 0 it is 4

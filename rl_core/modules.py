@@ -38,6 +38,8 @@ def perceptron(sizes: Sequence[int], parameters: F32, biases: bool = True) -> to
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.modules import perceptron
     >>> perceptron((2, 4, 1), np.zeros(17, np.float32))[0].in_features
     2
     """
@@ -76,6 +78,8 @@ def make_module(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.modules import make_module
     >>> from rl_core.policies import Module
     >>> make_module(Module("torch.nn:Linear"), 2, 3, np.random.default_rng(0)).out_features
     3
@@ -155,6 +159,8 @@ def as_arrays(module: torch.nn.Module) -> Arrays:
 
     Examples
     --------
+    >>> import torch
+    >>> from rl_core.modules import as_arrays
     >>> as_arrays(torch.nn.ReLU())
     {}
     """
@@ -171,6 +177,8 @@ def load_arrays(module: torch.nn.Module, arrays: Mapping[str, NDArray[Any]]) -> 
 
     Examples
     --------
+    >>> import torch
+    >>> from rl_core.modules import load_arrays
     >>> load_arrays(torch.nn.ReLU(), {})
     """
     instance("module", module, torch.nn.Module, "a torch.nn.Module")
@@ -205,6 +213,8 @@ class Adam(_Optimiser):
 
     Examples
     --------
+    >>> import torch
+    >>> from rl_core.modules import Adam
     >>> theta = torch.nn.Parameter(torch.ones(1))
     >>> theta.grad = torch.tensor([5.0])
     >>> Adam([theta], lr=0.1).step()
@@ -227,6 +237,8 @@ class RMSProp(_Optimiser):
 
     Examples
     --------
+    >>> import torch
+    >>> from rl_core.modules import RMSProp
     >>> theta = torch.nn.Parameter(torch.ones(1))
     >>> theta.grad = torch.tensor([1.0])
     >>> RMSProp([theta], lr=0.1).step()

@@ -128,6 +128,8 @@ def q_value_iteration(
 
     Examples
     --------
+    >>> from rl_core.mdp import MDP
+    >>> from rl_core.planning import q_value_iteration
     >>> lake = MDP.from_env("FrozenLake-v1")
     >>> q_value_iteration(lake, gamma=0.99, threshold=1e-9).Q[14].round(3).tolist()
     [0.733, 0.863, 0.821, 0.781]
@@ -211,6 +213,8 @@ def value_iteration(
 
     Examples
     --------
+    >>> from rl_core.mdp import MDP
+    >>> from rl_core.planning import value_iteration
     >>> lake = MDP.from_env("FrozenLake-v1")
     >>> plan = value_iteration(lake, gamma=0.99, tolerance=1e-9)
     >>> round(plan.V[0], 6), bool(plan.table["bound"].iloc[-1] <= 1e-9)
@@ -330,6 +334,8 @@ def policy_iteration(
 
     Examples
     --------
+    >>> from rl_core.mdp import MDP
+    >>> from rl_core.planning import policy_iteration
     >>> lake = MDP.from_env("FrozenLake-v1")
     >>> plan = policy_iteration(lake, gamma=0.99)
     >>> round(plan.V[0], 6), plan.table["policy_changes"].tolist()[-1]
@@ -397,6 +403,9 @@ def policy_evaluation(mdp: MDP, policy: ArrayLike, *, gamma: float) -> F64:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.mdp import MDP
+    >>> from rl_core.planning import policy_evaluation
     >>> lake = MDP.from_env("FrozenLake-v1")
     >>> always_right = np.full(16, 2)
     >>> policy_evaluation(lake, always_right, gamma=0.99)[0].round(4)
@@ -444,6 +453,9 @@ def backup(mdp: MDP, V: ArrayLike, *, gamma: float) -> F64:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.mdp import MDP
+    >>> from rl_core.planning import backup
     >>> lake = MDP.from_env("FrozenLake-v1")
     >>> backup(lake, np.zeros(16), gamma=0.99)[14].round(3).tolist()
     [0.0, 0.333, 0.333, 0.333]
@@ -480,6 +492,7 @@ def greedy_policy(Q: ArrayLike) -> Ints:
 
     Examples
     --------
+    >>> from rl_core.planning import greedy_policy
     >>> greedy_policy([[0.0, 1.0 - 1e-14, 1.0], [2.0, 0.0, 2.0]]).tolist()
     [1, 0]
     """
@@ -512,6 +525,7 @@ def optimal_actions(Q: ArrayLike, tolerance: float = 1e-9) -> Bools:
 
     Examples
     --------
+    >>> from rl_core.planning import optimal_actions
     >>> optimal_actions([[0.0, 1.0, 0.99]], tolerance=0.1).tolist()
     [[False, True, True]]
     """

@@ -46,6 +46,7 @@ class MLP:
 
     Examples
     --------
+    >>> from rl_core.policies import MLP
     >>> MLP((10, 20)).biases
     True
     """
@@ -77,6 +78,7 @@ class Module:
 
     Examples
     --------
+    >>> from rl_core.policies import Module
     >>> Module("torch.nn:Linear").function
     'torch.nn:Linear'
     """
@@ -127,6 +129,7 @@ class Gaussian:
 
     Examples
     --------
+    >>> from rl_core.policies import Gaussian
     >>> Gaussian(mean="direct", sigma=0.5).learn_sigma
     False
     """
@@ -157,6 +160,7 @@ def check_network(network: object, engine: object) -> Literal["compiled", "torch
 
     Examples
     --------
+    >>> from rl_core.policies import MLP, Module, check_network
     >>> check_network(MLP(), None), check_network(Module("torch.nn:Linear"), None)
     ('compiled', 'torch')
     >>> check_network(Module("torch.nn:Linear"), "compiled")
@@ -198,6 +202,7 @@ def make_policy(
 
     Examples
     --------
+    >>> from rl_core.policies import Gaussian, make_policy
     >>> make_policy(Gaussian(constant_feature=True), (10, 20), 2, 0, 1).sizes
     array([ 3, 10, 20,  3])
     """
@@ -225,6 +230,8 @@ def initial_parameters(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.policies import Gaussian, initial_parameters, make_policy
     >>> policy = make_policy(Gaussian(), (), 2, 0, 1)
     >>> initial_parameters(policy, Gaussian(sigma=1.0), np.random.default_rng(0))[6:]
     array([0.], dtype=float32)
@@ -241,6 +248,7 @@ def trainable(policy: Policy, distribution: Categorical | Gaussian, biases: bool
 
     Examples
     --------
+    >>> from rl_core.policies import Gaussian, make_policy, trainable
     >>> policy = make_policy(Gaussian(), (), 2, 0, 1)
     >>> trainable(policy, Gaussian(), biases=False)
     array([1., 1., 1., 1., 0., 0., 0.], dtype=float32)

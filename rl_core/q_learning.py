@@ -83,6 +83,8 @@ class QLearningConfig:
 
     Examples
     --------
+    >>> from rl_core.exploration import EpsilonGreedy, VisitDecay
+    >>> from rl_core.q_learning import QLearningConfig
     >>> QLearningConfig(step_size=VisitDecay(), exploration=EpsilonGreedy(0.9)).gamma
     0.9
     """
@@ -186,6 +188,8 @@ def q_learning(
 
     Examples
     --------
+    >>> from rl_core.exploration import EpsilonGreedy
+    >>> from rl_core.q_learning import QLearningConfig, q_learning
     >>> from rl_core.maze import Maze
     >>> config = QLearningConfig(exploration=EpsilonGreedy(0.9))
     >>> run = q_learning(Maze().model(), config, episodes=100, seeds=[0, 1])
@@ -226,6 +230,7 @@ def check_q_learning(env: object, config: object) -> None:
 
     Examples
     --------
+    >>> from rl_core.q_learning import QLearningConfig, check_q_learning
     >>> check_q_learning("MountainCar-v0", QLearningConfig(bins=10))
     """
     checks.instance("config", config, QLearningConfig, "a QLearningConfig")
@@ -273,6 +278,8 @@ def q_learning_on_model(
 
     Examples
     --------
+    >>> from rl_core.exploration import EpsilonGreedy
+    >>> from rl_core.q_learning import QLearningConfig, q_learning_on_model
     >>> config = QLearningConfig(exploration=EpsilonGreedy(0.9))
     >>> run = q_learning_on_model("rl_core/Maze-v0", config, episodes=2000, seeds=[0])
     >>> run.table["error_norm"].iloc[[0, -1]].round().tolist()  # it cannot get below 7.957
@@ -309,6 +316,7 @@ def check_q_learning_on_model(env: object, config: object) -> None:
 
     Examples
     --------
+    >>> from rl_core.q_learning import QLearningConfig, check_q_learning_on_model
     >>> check_q_learning_on_model("rl_core/Maze-v0", QLearningConfig())
     """
     checks.instance("env", env, str, "an environment's id")
@@ -360,6 +368,8 @@ def make_yardstick(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.q_learning import make_yardstick
     >>> from rl_core.maze import Maze
     >>> yardstick = make_yardstick(Maze().model(), np.zeros((112, 4)), (112, 4))
     >>> int(yardstick.visitable.sum())

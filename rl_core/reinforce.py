@@ -80,6 +80,8 @@ class ReinforceConfig:
 
     Examples
     --------
+    >>> from rl_core.policies import MLP
+    >>> from rl_core.reinforce import ReinforceConfig
     >>> ReinforceConfig(gamma=0.9, network=MLP((10,))).engine
     'compiled'
     """
@@ -128,6 +130,8 @@ def discounted_returns(rewards: F64, gamma: float) -> F64:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.reinforce import discounted_returns
     >>> discounted_returns(np.array([1.0, 2.0, 4.0]), 0.5)
     array([3., 4., 4.])
     """
@@ -145,6 +149,8 @@ def normalised(returns: F64, centre: bool, scale: bool) -> F64:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.reinforce import normalised
     >>> normalised(np.array([1.0, 3.0]), True, True)
     array([-1.,  1.])
     """
@@ -172,6 +178,10 @@ def log_probability(
 
     Examples
     --------
+    >>> import torch
+    >>> from rl_core import policies
+    >>> from rl_core.policies import Categorical
+    >>> from rl_core.reinforce import log_probability
     >>> policy = policies.make_policy(Categorical(), (), 1, 2, 0)
     >>> y, s, a = torch.zeros(1, 2), torch.ones(1, 1), torch.ones(1, 1)
     >>> round(float(log_probability(policy, y, s, a, torch.zeros(0)).exp()), 3)
@@ -318,6 +328,7 @@ def check_reinforce(env: EnvironmentLike, config: ReinforceConfig) -> None:
 
     Examples
     --------
+    >>> from rl_core.reinforce import ReinforceConfig, check_reinforce
     >>> check_reinforce("MountainCar-v0", ReinforceConfig())
     """
     instance("config", config, ReinforceConfig, "a ReinforceConfig")
@@ -360,6 +371,8 @@ def reinforce(
 
     Examples
     --------
+    >>> from rl_core.policies import MLP
+    >>> from rl_core.reinforce import ReinforceConfig, reinforce
     >>> config = ReinforceConfig(network=MLP((4,)), max_episode_steps=200)
     >>> run = reinforce("Acrobot-v1", config, episodes=2, seeds=[0, 1])
     >>> run.table["episode"].tolist(), run.arrays["layer0.weight"].shape

@@ -44,6 +44,7 @@ def iqm(values: ArrayLike, axis: int = 0) -> Any:
     learning at the edge of the statistical precipice"). NaN among the values gives NaN; infinities
     of both signs in the middle half are a ValueError.
 
+    >>> from rl_core.statistics import iqm
     >>> float(iqm([100.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, -7.0]))
     3.5
     """
@@ -97,6 +98,8 @@ def bootstrap_interval(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.statistics import bootstrap_interval
     >>> estimate, low, high = bootstrap_interval(
     ...     [93.0, 101.0, 88.0, 120.0, 97.0], rng=np.random.default_rng(0)
     ... )
@@ -162,6 +165,8 @@ def paired_difference_interval(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.statistics import paired_difference_interval
     >>> rng = np.random.default_rng(0)
     >>> paired_difference_interval([5.0, 7.0, 9.0], [4.0, 5.0, 6.0], np.mean, rng=rng).estimate
     2.0
@@ -210,6 +215,8 @@ def probability_of_improvement(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.statistics import probability_of_improvement
     >>> rng = np.random.default_rng(0)
     >>> probability_of_improvement([1.0, 2.0], [2.0, np.inf], rng=rng).estimate
     0.875
@@ -246,6 +253,7 @@ def proportion_interval(successes: int, trials: int, *, level: float = 0.95) -> 
 
     Examples
     --------
+    >>> from rl_core.statistics import proportion_interval
     >>> estimate, low, high = proportion_interval(27, 30)
     >>> f"{estimate:.2f} [{low:.2f}, {high:.2f}]"
     '0.90 [0.74, 0.97]'
@@ -298,6 +306,8 @@ def learning_curves(
 
     Examples
     --------
+    >>> import pandas as pd
+    >>> from rl_core.statistics import learning_curves
     >>> table = pd.DataFrame({"seed": [0, 0, 1], "episode": [1, 2, 1], "steps": [90, 70, 80]})
     >>> learning_curves(table, seeds=[0, 1, 2], episodes=2, window=2)
     array([[90., 80.],
@@ -360,6 +370,8 @@ def learned(curves: ArrayLike, threshold: float, *, window: int) -> Bools:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.statistics import learned
     >>> curves = [[500.0, 90.0, 95.0], [500.0, 500.0, 90.0], [90.0, 90.0, np.nan]]
     >>> learned(curves, 100, window=2)
     array([ True, False, False])
@@ -395,6 +407,7 @@ def episodes_to_threshold(curves: ArrayLike, threshold: float, *, hold: int = 1)
 
     Examples
     --------
+    >>> from rl_core.statistics import episodes_to_threshold
     >>> episodes_to_threshold([[9.0, 3.0, 9.0, 2.0, 1.0], [9.0, 9.0, 9.0, 9.0, 3.0]], 3, hold=2)
     array([ 4., inf])
     """

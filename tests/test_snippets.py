@@ -1,7 +1,5 @@
-"""What is shown to be pasted runs as it stands, imports included."""
+"""What is shown to be pasted runs as it stands, imports included; docstrings: `conftest.py`."""
 
-import doctest
-import importlib
 import os
 import re
 import sys
@@ -13,8 +11,6 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
-SELF_CONTAINED = ("rl_core.dqn", "rl_core.evaluation", "rl_core.training", "rl_core.identity")
-"""Whose examples need nothing of their module's own names. More are to follow."""
 
 
 def blocks(path):
@@ -40,17 +36,6 @@ def test_the_readme_s_snippets_run_one_after_the_other(elsewhere, capsys):
 def test_the_contributors_snippets_run(elsewhere):
     for code in blocks(ROOT / "CONTRIBUTING.md"):
         exec(compile(code, "CONTRIBUTING.md", "exec"), {"__name__": "__main__"})
-
-
-@pytest.mark.parametrize("name", SELF_CONTAINED)
-def test_examples_need_no_name_that_they_do_not_import(name):
-    """They run without their module's names, as after pasting."""
-    for test in doctest.DocTestFinder(exclude_empty=True).find(importlib.import_module(name), name):
-        runner, told = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS), []
-        test.globs = {"__name__": "pasted"}
-        if test.examples:
-            runner.run(test, out=told.append)
-        assert runner.summarize(verbose=False).failed == 0, "".join(told)
 
 
 # What other libraries ask for, held to them where they are installed, else to their shapes

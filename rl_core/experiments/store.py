@@ -71,6 +71,10 @@ class Store:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> import pandas as pd
+    >>> from pathlib import Path
+    >>> from rl_core.experiments.store import Store
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     store = Store(Path(folder))

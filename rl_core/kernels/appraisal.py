@@ -93,6 +93,8 @@ def new_appraisal(yardstick: Yardstick) -> Appraisal:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.kernels.appraisal import new_appraisal
     >>> from rl_core.maze import Maze
     >>> from rl_core.q_learning import make_yardstick
     >>> yardstick = make_yardstick(Maze().model(), np.zeros((112, 4)), (112, 4))
@@ -133,6 +135,7 @@ class Errors(NamedTuple):
 def empty_record(n_seeds: int, episodes: int) -> F64:
     """Return the record that a learner fills: float64 of shape (seeds, episodes, columns).
 
+    >>> from rl_core.kernels.appraisal import COLUMNS, empty_record
     >>> empty_record(2, 5).shape == (2, 5, len(COLUMNS))
     True
     """
@@ -142,6 +145,7 @@ def empty_record(n_seeds: int, episodes: int) -> F64:
 def as_table(record: F64, seeds: Sequence[int]) -> pd.DataFrame:
     """Return a record as a tidy table: `seed`, `episode`, `COLUMNS`; rows never written left out.
 
+    >>> from rl_core.kernels.appraisal import COLUMNS, as_table, empty_record
     >>> as_table(empty_record(1, 5), seeds=[0]).shape == (0, 2 + len(COLUMNS))
     True
     """
@@ -159,6 +163,7 @@ def as_table(record: F64, seeds: Sequence[int]) -> pd.DataFrame:
 def env_steps(record: F64) -> int:
     """Return the environment steps of all seeds so far.
 
+    >>> from rl_core.kernels.appraisal import empty_record, env_steps
     >>> env_steps(empty_record(2, 5))
     0
     """
@@ -212,6 +217,8 @@ def errors(Q: F64, yardstick: Yardstick) -> Errors:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.kernels.appraisal import errors
     >>> from rl_core.maze import Maze
     >>> from rl_core.q_learning import make_yardstick
     >>> yardstick = make_yardstick(Maze().model(), np.ones((112, 4)), (112, 4))
@@ -263,6 +270,8 @@ def value_lost(Q: F64, yardstick: Yardstick, gamma: float, appraisal: Appraisal)
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.kernels.appraisal import new_appraisal, value_lost
     >>> from rl_core.maze import Maze
     >>> from rl_core.planning import value_iteration
     >>> from rl_core.q_learning import make_yardstick

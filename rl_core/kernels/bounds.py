@@ -27,6 +27,7 @@ def discount(gamma: object) -> float:
 
     Examples
     --------
+    >>> from rl_core.kernels.bounds import discount
     >>> discount(1)
     Traceback (most recent call last):
     ValueError: gamma must be a number from 0 below 1, got 1
@@ -51,6 +52,7 @@ def rounding_error(n_successors: int, magnitude: float) -> float:
 
     Examples
     --------
+    >>> from rl_core.kernels.bounds import rounding_error
     >>> rounding_error(3, magnitude=1.0) == 8 * 2.0**-52
     True
     """
@@ -64,6 +66,7 @@ def error_bound(residual: float, gamma: float, rounding: float) -> float:
 
     Examples
     --------
+    >>> from rl_core.kernels.bounds import error_bound
     >>> round(error_bound(residual=1e-5, gamma=0.9, rounding=0.0), 9)
     9e-05
     """
@@ -76,6 +79,7 @@ def sweeps_allowed(change: float, target: float, gamma: float) -> int:
 
     Examples
     --------
+    >>> from rl_core.kernels.bounds import sweeps_allowed
     >>> sweeps_allowed(1.0, 1e-6, gamma=0.5), sweeps_allowed(1.0, 1e-6, gamma=1 - 1e-8)
     (21, 100000)
     """

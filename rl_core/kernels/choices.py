@@ -37,6 +37,7 @@ def choose(kind: int, parameter: float, q: F64, u: float, v: float) -> int:
 
     Examples
     --------
+    >>> from rl_core.kernels.choices import EPSILON_GREEDY, choose
     >>> import numpy as np
     >>> choose(EPSILON_GREEDY, 0.1, np.array([0.0, 2.0, 1.0]), u=0.5, v=0.9)
     1
@@ -118,6 +119,7 @@ def after_step(state: F64, t: int) -> None:
 
     Examples
     --------
+    >>> from rl_core.kernels.choices import VALUE, after_step
     >>> import numpy as np
     >>> state = np.array([1.0, 1.0, 0.0, 4, 0.0, 1.0])  # from 1 to 0 in four steps
     >>> after_step(state, 3)
@@ -140,6 +142,7 @@ def after_goal(state: F64) -> None:
 
     Examples
     --------
+    >>> from rl_core.kernels.choices import VALUE, after_goal
     >>> import numpy as np
     >>> state = np.array([1.0, 1.0, 0.0, 0, 0.5, 1.0])  # half-way from 1 to 0
     >>> after_goal(state)
@@ -161,6 +164,7 @@ def after_copy(state: F64) -> None:
 
     Examples
     --------
+    >>> from rl_core.kernels.choices import VALUE, after_copy, after_goal
     >>> import numpy as np
     >>> state = np.array([1.0, 1.0, 0.0, 0, 0.5, 1.0])  # half-way from 1 to 0
     >>> after_goal(state)

@@ -81,6 +81,7 @@ def switches() -> dict[str, str]:
 
     Examples
     --------
+    >>> from rl_core.kernels.compiled import SWITCHES
     >>> from rl_core.kernels.compiled import switches
     >>> sorted(switches()) == sorted(SWITCHES)
     True

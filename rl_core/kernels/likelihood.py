@@ -139,6 +139,8 @@ def choose_action(actor: Actor, observation: F32, noise: F64, action: F32) -> No
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.kernels.likelihood import Policy, choose_action, make_actor
     >>> policy = Policy(np.array([2, 3]), False, False, False, 1)
     >>> actor, action = make_actor(policy, np.zeros(9, np.float32)), np.empty(1, np.float32)
     >>> choose_action(actor, np.ones(2, np.float32), np.array([0.5]), action)
@@ -270,6 +272,9 @@ def likelihood_gradient(
     --------
     With equal probabilities, the gradient by the output of action k is 1/2 - [k = a].
 
+    >>> import numpy as np
+    >>> from rl_core.kernels import networks
+    >>> from rl_core.kernels.likelihood import Policy, likelihood_gradient
     >>> policy = Policy(np.array([1, 2]), False, False, False, 1)
     >>> units, deltas = np.empty((2, 3, networks.padded(1)), np.float32)
     >>> parameters, gradient = np.zeros(4, np.float32), np.empty(4, np.float32)

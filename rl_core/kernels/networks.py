@@ -34,6 +34,7 @@ def count_parameters(sizes: Sequence[int]) -> int:
 
     Examples
     --------
+    >>> from rl_core.kernels.networks import count_parameters
     >>> count_parameters((6, 10, 20, 3))
     353
     """
@@ -63,6 +64,8 @@ def xavier_uniform(sizes: Sequence[int], rng: np.random.Generator) -> F32:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.kernels.networks import xavier_uniform
     >>> parameters = xavier_uniform((2, 4, 1), np.random.default_rng(0))
     >>> parameters.size, bool((abs(parameters[:8]) <= 1.0).all()), float(parameters[8])
     (17, True, 0.0)
@@ -92,6 +95,8 @@ def unpack(sizes: Sequence[int], parameters: F32) -> dict[str, F32]:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.kernels.networks import unpack
     >>> unpack((2, 4, 1), np.zeros((30, 17), np.float32))["layer0.weight"].shape
     (30, 2, 4)
     """
@@ -117,6 +122,8 @@ def pack(layers: Mapping[str, F32]) -> tuple[tuple[int, ...], F32]:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.kernels.networks import pack
     >>> sizes, parameters = pack({"layer0.weight": np.ones((2, 3), np.float32)})
     >>> sizes, parameters.size
     ((2, 3), 9)
@@ -146,6 +153,7 @@ def trainable_mask(sizes: Sequence[int], biases: bool) -> F32:
 
     Examples
     --------
+    >>> from rl_core.kernels.networks import trainable_mask
     >>> trainable_mask((1, 2), biases=False)
     array([1., 1., 0., 0.], dtype=float32)
     """
@@ -172,6 +180,8 @@ def output(sizes: Sequence[int], parameters: F32, inputs: NDArray[np.floating]) 
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.kernels.networks import output
     >>> output((2, 1), np.array([1, 2, 3], np.float32), np.array([[10, 1]]))
     array([[15.]], dtype=float32)
     """
@@ -367,6 +377,8 @@ def adam_step(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.kernels.networks import adam_step
     >>> theta, m, v = np.ones(1, np.float32), np.zeros(1, np.float32), np.zeros(1, np.float32)
     >>> adam_step(theta, np.array([5.0], np.float32), m, v, 1, 0.1)
     >>> round(float(theta[0]), 6)
@@ -405,6 +417,8 @@ def rmsprop_step(parameters: F32, gradient: F32, mean_square: F32, learning_rate
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.kernels.networks import rmsprop_step
     >>> theta, v = np.ones(1, np.float32), np.full(1, 25.0, np.float32)
     >>> rmsprop_step(theta, np.array([5.0], np.float32), v, 0.1)
     >>> round(float(theta[0]), 6)

@@ -108,6 +108,9 @@ def make_learner(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.kernels import networks
+    >>> from rl_core.kernels.q_update import Settings, make_learner
     >>> theta = networks.xavier_uniform((2, 4, 3), np.random.default_rng(0))
     >>> way = Settings(0.9, 512, 1, 1, 10, 1, 1e-3, True, False, 3)
     >>> learner = make_learner((2, 4, 3), theta, way, np.zeros(6), biases=False)
@@ -141,6 +144,8 @@ def q_values(learner: Any, observation: F32) -> F64:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.kernels.q_update import Settings, make_learner, q_values
     >>> way = Settings(0.9, 2, 1, 1, 10, 1, 1e-3, True, False, 3)
     >>> theta = np.array([1, 0, 0, 1, 2, 2, 0, 0, 0], np.float32)
     >>> learner = make_learner((2, 3), theta, way, np.zeros(6), biases=False)
@@ -201,6 +206,7 @@ def target(reward: float, next_value: float, end: bool, gamma: float, through_en
 
     Examples
     --------
+    >>> from rl_core.kernels.q_update import target
     >>> target(-1.0, 10.0, False, 0.9, False), target(-1.0, 10.0, True, 0.9, False)
     (8.0, -1.0)
     """
@@ -220,6 +226,8 @@ def loss_gradient(learner: Learner, memory: Memory) -> float:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.kernels.q_update import Settings, loss_gradient, make_learner
     >>> from rl_core.kernels.replay import make_memory, store
     >>> way = Settings(0.9, 2, 1, 1, 10, 1, 1e-3, True, False, 3)
     >>> theta = np.zeros(9, np.float32)
@@ -275,6 +283,8 @@ def update(learner: Any, memory: Memory) -> bool:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.kernels.q_update import COPIES, Settings, make_learner, update
     >>> from rl_core.kernels.replay import make_memory, store
     >>> way = Settings(0.9, 2, 1, 1, 1, 1, 1e-3, True, False, 3)  # Adam, a copy at each update
     >>> theta = np.zeros(9, np.float32)

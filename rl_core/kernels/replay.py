@@ -65,6 +65,7 @@ def bytes_a_transition(n_observations: int, *, as_bytes: bool = False) -> int:
 
     Examples
     --------
+    >>> from rl_core.kernels.replay import bytes_a_transition, make_memory
     >>> bytes_a_transition(4), sum(array.nbytes for array in make_memory(1, 4)[:-1])
     (61, 61)
     """
@@ -96,6 +97,7 @@ def make_memory(capacity: int, n_observations: int, *, as_bytes: bool = False) -
 
     Examples
     --------
+    >>> from rl_core.kernels.replay import held, make_memory
     >>> memory = make_memory(3000, 6)
     >>> memory.observations.shape, held(memory)
     ((3000, 6), 0)
@@ -118,6 +120,8 @@ def keep(room: NDArray[Any], observation: F32) -> None:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.kernels.replay import keep, scaled
     >>> row = np.zeros(2, np.uint8)
     >>> keep(row, np.array([0.2, 1.0], np.float32))
     >>> row, scaled(row).round(3)
@@ -173,6 +177,8 @@ def held(memory: Memory) -> int:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.kernels.replay import held, make_memory, store
     >>> memory, s = make_memory(2, 1), np.ones(1, np.float32)
     >>> for _ in range(3):
     ...     store(memory, s, 0, -1.0, s, False)
@@ -201,6 +207,8 @@ def store(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.kernels.replay import make_memory, store
     >>> memory, s = make_memory(2, 1), np.ones(1, np.float32)
     >>> for reward in (-1.0, -2.0, -3.0):
     ...     store(memory, s, 0, reward, s, False)
@@ -231,6 +239,8 @@ def sample(memory: Memory, uniforms: F64, slots: I64) -> None:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.kernels.replay import make_memory, sample, store
     >>> memory, s = make_memory(10, 1), np.ones(1, np.float32)
     >>> for _ in range(4):
     ...     store(memory, s, 0, -1.0, s, False)

@@ -91,6 +91,9 @@ def make_grid(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from gymnasium import spaces
+    >>> from rl_core.worlds.discretise import make_grid
     >>> space = spaces.Box(np.array([-1.2, -0.07]), np.array([0.6, 0.07]), dtype=np.float64)
     >>> make_grid(space, (3, 2)).n_cells
     6
@@ -123,6 +126,7 @@ def checked_bins(name: str, bins: object) -> int | tuple[int, ...]:
 
     Examples
     --------
+    >>> from rl_core.worlds.discretise import checked_bins
     >>> checked_bins("bins", [10, 20])
     (10, 20)
     """
@@ -145,6 +149,8 @@ def cell(grid: Grid, observation: F32) -> int:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.worlds.discretise import Grid, cell
     >>> grid = Grid(np.array([0.0, 0.0]), np.array([1.0, 1.0]), np.array([2, 5]))
     >>> [cell(grid, np.array(o, np.float32)) for o in ((0.1, 0.3), (0.6, 0.3), (7.0, 7.0))]
     [1, 6, 9]
@@ -182,6 +188,8 @@ def action_levels(space: spaces.Space[Any], levels: int | None) -> F32:
 
     Examples
     --------
+    >>> from gymnasium import spaces
+    >>> from rl_core.worlds.discretise import action_levels
     >>> action_levels(spaces.Box(-1, 1, (1,)), 3).ravel()
     array([-1.,  0.,  1.], dtype=float32)
     """
@@ -224,6 +232,7 @@ class Discretised(gymnasium.Wrapper[Any, Any, Any, Any]):
 
     Examples
     --------
+    >>> from rl_core.worlds.discretise import Discretised
     >>> env = Discretised("MountainCarContinuous-v0", bins=20, levels=3)
     >>> env.observation_space, env.action_space
     (Discrete(400), Discrete(3))
@@ -331,6 +340,7 @@ def gridded(
 
     Examples
     --------
+    >>> from rl_core.worlds.discretise import gridded
     >>> gridded("MountainCar-v0", bins=10).shape
     (100, 3)
     """
@@ -348,6 +358,7 @@ def task_of(env: object) -> Task | None:
 
     Examples
     --------
+    >>> from rl_core.worlds.discretise import task_of
     >>> task_of("FrozenLake-v1") is None
     True
     """

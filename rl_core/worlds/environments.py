@@ -160,6 +160,9 @@ def native_action(space: spaces.Space[Any], action: F32) -> Any:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from gymnasium import spaces
+    >>> from rl_core.worlds.environments import native_action
     >>> native_action(spaces.Discrete(3, start=-1), np.array([2], np.float32))
     1
     """
@@ -180,6 +183,8 @@ def observed(space: spaces.Space[Any], seen: Any, env: object) -> NDArray[Any]:
 
     Examples
     --------
+    >>> from gymnasium import spaces
+    >>> from rl_core.worlds.environments import observed
     >>> observed(spaces.Box(0, 9, (2,)), [1, 2], "Pond-v0")
     array([1, 2])
     """
@@ -205,6 +210,9 @@ def checked_reward(env: object, reward: Any) -> float:
 
     Examples
     --------
+    >>> import gymnasium
+    >>> import numpy as np
+    >>> from rl_core.worlds.environments import checked_reward
     >>> checked_reward(gymnasium.make("FrozenLake-v1"), np.array([1]))
     1.0
     """
@@ -237,6 +245,8 @@ def step(stepper: Kernel | GymnasiumWorld, action: F32, following: F32) -> tuple
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.worlds.environments import open_world, step
     >>> world = open_world("MountainCar-v0")
     >>> world.seed(0)
     >>> following = world.reset()
@@ -282,6 +292,7 @@ def open_world(env: EnvironmentLike) -> World:
 
     Examples
     --------
+    >>> from rl_core.worlds.environments import open_world
     >>> open_world("Acrobot-v1").n_actions
     3
     """
@@ -309,6 +320,7 @@ def opened(env: Any) -> gymnasium.Env[Any, Any]:
 
     Examples
     --------
+    >>> from rl_core.worlds.environments import opened
     >>> opened("FrozenLake-v1").observation_space
     Discrete(16)
     """
@@ -343,6 +355,8 @@ def one_seed_of(env: object, seeds: Iterable[int]) -> tuple[int, ...]:
 
     Examples
     --------
+    >>> import gymnasium
+    >>> from rl_core.worlds.environments import one_seed_of
     >>> one_seed_of(gymnasium.make("CartPole-v1"), [0, 1])
     Traceback (most recent call last):
     ValueError: env must be an id or a function that makes an environment where there are several...

@@ -208,6 +208,10 @@ def play_episode(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.kernels import likelihood
+    >>> from rl_core.kernels.likelihood import Policy
+    >>> from rl_core.worlds.episodes import Trajectory, play_episode
     >>> from rl_core.worlds.environments import open_world
     >>> policy = Policy(np.array([2, 3]), False, False, False, 1)
     >>> actor = likelihood.make_actor(policy, np.zeros(9, np.float32))

@@ -48,6 +48,7 @@ def read_layout(layout: str | Sequence[str]) -> NDArray[np.str_]:
 
     Examples
     --------
+    >>> from rl_core.worlds.maze_layout import read_layout
     >>> read_layout("SOG")
     array([['S', 'O', 'G']], dtype='<U1')
     """
@@ -63,6 +64,7 @@ def find(letters: NDArray[np.str_], letter: str) -> list[Cell]:
 
     Examples
     --------
+    >>> from rl_core.worlds.maze_layout import COURSE_LAYOUT, find, read_layout
     >>> find(read_layout(COURSE_LAYOUT), "F")
     [(0, 2), (3, 0), (3, 3)]
     """
@@ -106,6 +108,8 @@ def random_layout(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.worlds.maze_layout import find, random_layout
     >>> letters = random_layout(4, 6, flags=2, wall_fraction=0.25, rng=np.random.default_rng(1))
     >>> len(find(letters, "W"))
     6

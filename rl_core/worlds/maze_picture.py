@@ -66,6 +66,8 @@ def draw_maze(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.worlds.maze_picture import draw_maze
     >>> walls = np.zeros((1, 3), dtype=bool)
     >>> picture = draw_maze(walls, (0, 0), [(0, 2)], {"A": (0, 1)}, held="", agent=(0, 0))
     >>> picture.shape, picture.dtype

@@ -41,6 +41,8 @@ def tip_height(observation: F32, reward: float) -> float:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.worlds.shaping import tip_height
     >>> hanging, bent = [1, 0, 1, 0, 0, 0], [0, 1, 0.6, 0.8, 5, 7]  # cosine, sine, cosine, sine
     >>> [tip_height(np.array(o, np.float32), -1.0) for o in (hanging, bent)]
     [-2.0, 0.800000011920929]
@@ -57,6 +59,8 @@ def distance_from_start(observation: F32, reward: float) -> float:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.worlds.shaping import distance_from_start
     >>> distance_from_start(np.array([-0.75, 0.03], np.float32), -1.0)
     0.25
     """
@@ -71,6 +75,8 @@ def balance(observation: F32, reward: float) -> float:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.worlds.shaping import balance
     >>> round(balance(np.array([-0.6, 3, 0.1, 5], np.float32), 1.0), 6)  # (1 - 1/4 - 1/5) / 20
     0.0275
     """
@@ -95,6 +101,7 @@ class Shaping:
 
     Examples
     --------
+    >>> from rl_core.worlds.shaping import Shaping
     >>> Shaping("rl_core.worlds.shaping:tip_height").function
     'rl_core.worlds.shaping:tip_height'
     """
@@ -138,6 +145,7 @@ def shape_for(shaping: Shaping | None, n_observations: int) -> Any:
 
     Examples
     --------
+    >>> from rl_core.worlds.shaping import Shaping, shape_for
     >>> shape_for(Shaping("rl_core.worlds.shaping:tip_height"), 2)
     Traceback (most recent call last):
     ValueError: shaping must be a function of observations of 2 numbers, got 'rl_core.worlds.shap...
@@ -158,6 +166,8 @@ def shaped_reward(shape: Any, observation: F32, reward: float) -> float:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rl_core.worlds.shaping import compiled_shape, shaped_reward
     >>> shape = compiled_shape("rl_core.worlds.shaping:tip_height")
     >>> shaped_reward(shape, np.array([1, 0, 1, 0, 0, 0], np.float32), -1.0)
     -2.0

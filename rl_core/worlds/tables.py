@@ -24,6 +24,8 @@ def read_table(env: gym.Env[Any, Any], start_distribution: ArrayLike | None = No
 
     Examples
     --------
+    >>> import gymnasium as gym
+    >>> from rl_core.worlds.tables import read_table
     >>> lake = gym.make("FrozenLake-v1").unwrapped
     >>> read_table(lake)["successor"].shape
     (16, 4, 3)
@@ -75,6 +77,7 @@ def start_arrays(start_distribution: ArrayLike, n_states: int) -> Arrays:
 
     Examples
     --------
+    >>> from rl_core.worlds.tables import start_arrays
     >>> start_arrays([0.0, 0.25, 0.75], 3)["start_state"]
     array([1, 2], dtype=int32)
     """

@@ -47,6 +47,7 @@ def spawn_draws(seed: int, n: int) -> list[Draws]:
 
     Examples
     --------
+    >>> from rl_core.worlds.tabular import spawn_draws
     >>> learning, evaluation = spawn_draws(0, 2)
     >>> learning.step.random() != evaluation.step.random()
     True
@@ -91,6 +92,7 @@ def played(env: EnvironmentLike) -> Played:
 
     Examples
     --------
+    >>> from rl_core.worlds.tabular import played
     >>> played("MountainCar-v0")
     Traceback (most recent call last):
     ValueError: env must have a Discrete observation space, got Box([-1.2  -0.07], [0.6  0.07], ...
@@ -112,6 +114,7 @@ def known_model(world: Played) -> MDP | None:
 
     Examples
     --------
+    >>> from rl_core.worlds.tabular import known_model, played
     >>> known_model(played("FrozenLake-v1")).n_states
     16
     """

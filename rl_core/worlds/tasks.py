@@ -245,6 +245,7 @@ def clip(value: float, low: float, high: float) -> float:
 
     Examples
     --------
+    >>> from rl_core.worlds.tasks import clip
     >>> clip(3.0, -1.0, 1.0)
     1.0
     """

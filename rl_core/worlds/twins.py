@@ -37,6 +37,7 @@ def twin(env_id: str) -> Task | None:
 
     Examples
     --------
+    >>> from rl_core.worlds.twins import twin
     >>> twin("CartPole-v1").max_episode_steps, twin("MountainCar-v0").max_episode_steps
     (500, None)
     >>> twin("CartPole-v0") is None
