@@ -4,7 +4,6 @@ Run by `make browser`, which builds the book first. The browser is a Chromium or
 installed already; `CHROMIUM` names another one.
 """
 
-import os
 import re
 import threading
 import time
@@ -18,9 +17,7 @@ from urllib.parse import unquote, urldefrag, urljoin
 import numpy as np
 import pandas as pd
 import pytest
-from playwright.sync_api import Browser, Locator, Page, Route
-
-from web.chromium import NoBrowserError, open_browser
+from playwright.sync_api import Locator, Page, Route
 
 ROOT = Path(__file__).parent.parent
 SITE = ROOT / "_build" / "html"
@@ -55,18 +52,6 @@ def address() -> Iterator[str]:
         yield f"http://127.0.0.1:{server.server_port}"
         server.shutdown()
         thread.join()
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Browser]:
-    """A browser without a window; on a machine without any there is nothing to see with."""
-    try:
-        with open_browser() as browser:
-            yield browser
-    except NoBrowserError as error:
-        if os.environ.get("CI"):
-            raise
-        pytest.skip(str(error))
 
 
 class Visit:

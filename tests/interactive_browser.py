@@ -4,7 +4,6 @@ Run with the test of the book's pages; it needs a browser but not the book. Star
 writes the page it looks at, `python tests/interactive_browser.py demo.html`, for people to look at.
 """
 
-import os
 import sys
 from collections.abc import Iterator
 from io import StringIO
@@ -19,7 +18,6 @@ ROOT = Path(__file__).parent.parent
 sys.path[:0] = [str(ROOT), str(ROOT / "book")]  # for the program; pytest has them already
 
 from browser import CONTRAST, VIEWS  # noqa: E402
-from chromium import NoBrowserError, open_browser  # noqa: E402
 from interactive import (  # noqa: E402
     knob,
     learning_log,
@@ -31,7 +29,7 @@ from interactive import (  # noqa: E402
     snapshots,
 )
 from matplotlib.figure import Figure  # noqa: E402
-from playwright.sync_api import Browser, Locator, Page  # noqa: E402
+from playwright.sync_api import Locator, Page  # noqa: E402
 
 from drawings.look import Film  # noqa: E402
 from drawings.maze import situation_figure  # noqa: E402
@@ -158,18 +156,6 @@ def address(demo, tmp_path_factory) -> str:
     file = tmp_path_factory.mktemp("demo") / "demo.html"
     file.write_text(demo.page())
     return file.as_uri()
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Browser]:
-    """A browser without a window; on a machine without any there is nothing to see with."""
-    try:
-        with open_browser() as browser:
-            yield browser
-    except NoBrowserError as error:
-        if os.environ.get("CI"):
-            raise
-        pytest.skip(str(error))
 
 
 @pytest.fixture(scope="module", params=VIEWS)
