@@ -53,7 +53,15 @@ from rl_core.worlds.environments import (
     open_world,
     opened,
 )
-from rl_core.worlds.episodes import AnyActor, ModuleActor, TableActor, Trajectory, act, play_episode
+from rl_core.worlds.episodes import (
+    AnyActor,
+    ModuleActor,
+    TableActor,
+    Trajectory,
+    act,
+    play_episode,
+    with_own_scratch,
+)
 from rl_core.worlds.names import Make, find
 from rl_core.worlds.twins import twin
 
@@ -152,7 +160,8 @@ class Agent:
         >>> agent.predict(np.ones(1)), agent.predict(np.ones((2, 1)))[0]
         ((np.int64(1), None), array([1, 1]))
         """
-        actor = self._greedy if truth("deterministic", deterministic) else self.actor
+        chosen = self._greedy if truth("deterministic", deterministic) else self.actor
+        actor = with_own_scratch(chosen)
         policy, n_seen = actor.policy, _observed(actor)
         shape = (n_seen,) if self.spaces is None else self.spaces[0].shape
         seen = np.asarray(observation)

@@ -1,5 +1,7 @@
 """Evaluation: the same starts for everyone, greedy policies, and Gymnasium's own episodes."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import gymnasium
 import numpy as np
 import pytest
@@ -433,3 +435,18 @@ def test_a_grid_without_end_is_refused():
         state_grid(gymnasium.spaces.Discrete(3), 3)
     with pytest.raises(ValueError, match=r"^points must be an integer from 2, got 1"):
         state_grid(gymnasium.spaces.Box(-1.0, 1.0, (2,)), 1)
+
+
+def test_threads_may_play_with_one_agent_at_once():
+    """Compiled episodes do not hold the interpreter's lock: what they scribble on is their own."""
+    weights = {"layer0.weight": np.zeros((2, 1), np.float32), "log_sigma": np.zeros(1, np.float32)}
+    config = ReinforceConfig(network=MLP(()), policy=Gaussian(mean="direct", sigma=1.0))
+    agent = as_learned(config, weights)
+
+    def play(seed: int) -> float:
+        one = rollout("MountainCarContinuous-v0", agent, np.random.default_rng(seed), 20_000)
+        return float(one.rewards.sum())
+
+    alone = [play(seed) for seed in range(40)]
+    with ThreadPoolExecutor(4) as threads:
+        assert [*threads.map(play, range(40))] == alone

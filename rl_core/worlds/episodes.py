@@ -143,6 +143,25 @@ class Trajectory:
             setattr(self, name, larger)
 
 
+def with_own_scratch(actor: AnyActor) -> AnyActor:
+    """Return the same policy with scratch space of its own, for threads that play with one at once.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rl_core.kernels.likelihood import Policy, make_actor
+    >>> from rl_core.worlds.episodes import with_own_scratch
+    >>> policy = Policy(np.array([2, 3]), False, False, False, 1)
+    >>> actor = make_actor(policy, np.zeros(9, np.float32))
+    >>> own = with_own_scratch(actor)
+    >>> own.noise is actor.noise, own.parameters is actor.parameters
+    (False, True)
+    """
+    if isinstance(actor, Actor):
+        actor = actor._replace(units=np.empty_like(actor.units))
+    return actor._replace(noise=np.empty_like(actor.noise))
+
+
 def play(
     stepper: Any,
     actor: Any,
@@ -219,6 +238,7 @@ def play_episode(
     >>> play_episode(world, actor, np.random.default_rng(0), 100, Trajectory(2, 1))
     (100, False)
     """
+    actor = with_own_scratch(actor)
     both = isinstance(world, TaskWorld) and not isinstance(actor, ModuleActor)
     go_on = _play_compiled if both else play
     max_steps = min(max_steps, world.max_episode_steps or max_steps)
