@@ -5,7 +5,7 @@ import hashlib
 import io
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar, cast
+from typing import Any, Literal, ParamSpec, TypeVar, cast
 
 import numba
 from numba.core import caching
@@ -52,7 +52,31 @@ def compiled(function: Callable[_Arguments, _Result]) -> Callable[_Arguments, _R
     >>> add(1, 2)
     3
     """
-    kernel: Any = numba.njit(nogil=True, error_model="numpy")(function)
+    return _compiled(function, "never")
+
+
+def inlined(function: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]:
+    """Compile like `compiled`, but put the text of `function` into what calls it.
+
+    For what is called at every step with tuples of arrays: at a call numba counts references to
+    each of them, which takes longer than a small network.
+
+    Examples
+    --------
+    >>> from rl_core.kernels.compiled import inlined
+    >>> @inlined
+    ... def add(a: int, b: int) -> int:
+    ...     return a + b
+    >>> add(1, 2)
+    3
+    """
+    return _compiled(function, "always")
+
+
+def _compiled(
+    function: Callable[_Arguments, _Result], inline: Literal["never", "always"]
+) -> Callable[_Arguments, _Result]:
+    kernel: Any = numba.njit(nogil=True, error_model="numpy", inline=inline)(function)
     code = sources.loaded_code(function.__module__)
     if code and not _settings.DISABLE_JIT:
         # RuntimeError: no folder can be written. ValueError: its name cannot be encoded.

@@ -15,7 +15,7 @@ import numpy as np
 
 from rl_core.kernels import networks
 from rl_core.kernels.arrays import F32, F64, I64
-from rl_core.kernels.compiled import compiled
+from rl_core.kernels.compiled import compiled, inlined
 
 
 class Policy(NamedTuple):
@@ -57,7 +57,7 @@ def unpack(policy: Policy, parameters: F32) -> dict[str, F32]:
     return named
 
 
-@compiled
+@inlined
 def _write_features(policy: Policy, observation: F32, features: F32) -> None:
     """Write the network's inputs for one observation."""
     for i in range(observation.size):
@@ -124,7 +124,7 @@ def make_actor(policy: Policy, parameters: F32, epsilon: float = 0.0) -> Actor:
     return Actor(policy, parameters, epsilon, units, np.empty(policy.action_width))
 
 
-@compiled
+@inlined
 def choose_action(actor: Actor, observation: F32, noise: F64, action: F32) -> None:
     """Turn noise into an action drawn from pi(.|s), and write it to `action`.
 
@@ -155,7 +155,7 @@ def choose_action(actor: Actor, observation: F32, noise: F64, action: F32) -> No
     draw_action(policy, parameters[parameters.size - policy.action_width :], units, noise, action)
 
 
-@compiled
+@inlined
 def explores(policy: Policy, epsilon: float, noise: F64, action: F32) -> bool:
     """Write a uniformly random action with probability epsilon, where actions are discrete.
 
@@ -170,7 +170,7 @@ def explores(policy: Policy, epsilon: float, noise: F64, action: F32) -> bool:
     return False
 
 
-@compiled
+@inlined
 def draw_action(policy: Policy, log_sigma: F32, units: F32, noise: F64, action: F32) -> None:
     """Turn noise into an action, given the network's outputs.
 

@@ -17,12 +17,13 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
+from numba.extending import overload
 from numpy import copyto
 from numpy.typing import NDArray
 
 from rl_core.checks import distinct_seeds
 from rl_core.kernels.arrays import F32
-from rl_core.kernels.compiled import compiled, compiled_as
+from rl_core.kernels.compiled import inlined
 from rl_core.worlds.names import Make, find, make_environment
 from rl_core.worlds.tasks import Kernel, Task
 from rl_core.worlds.twins import twin
@@ -258,14 +259,18 @@ def step(stepper: Kernel | GymnasiumWorld, action: F32, following: F32) -> tuple
     return stepper.step(action, following)
 
 
-@compiled
+@inlined
 def _step_task(kernel: Kernel, action: F32, following: F32) -> tuple[float, bool, bool]:
     reward, terminated = kernel.step(kernel.state, action)
     kernel.observe(kernel.state, following)
     return reward, terminated, False
 
 
-compiled_as(step, _step_task)
+overload(step, inline="always")(
+    lambda stepper, action, following: (
+        lambda stepper, action, following: _step_task(stepper, action, following)
+    )
+)
 
 
 def open_world(env: EnvironmentLike) -> World:

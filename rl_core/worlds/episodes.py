@@ -112,7 +112,9 @@ _acts: dict[type, Any] = {
         actor, observation, noise, action
     ),
 }
-overload(act)(lambda actor, observation, noise, action: _acts[actor.instance_class])
+overload(act, inline="always")(
+    lambda actor, observation, noise, action: _acts[actor.instance_class]
+)
 
 
 class Trajectory:
