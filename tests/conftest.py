@@ -2,10 +2,9 @@
 
 import os
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
-from chromium import NoBrowserError, open_browser
-from playwright.sync_api import Browser
 
 
 def pytest_collection_modifyitems(items):
@@ -16,8 +15,10 @@ def pytest_collection_modifyitems(items):
 
 
 @pytest.fixture(scope="session")
-def browser() -> Iterator[Browser]:
+def browser() -> Iterator[Any]:
     """A browser without a window; on a machine without any there is nothing to see with."""
+    from chromium import NoBrowserError, open_browser  # not loaded for the unit tests
+
     try:
         with open_browser() as browser:
             yield browser
