@@ -33,7 +33,7 @@ from numba.core.registry import CPUDispatcher
 from numba.core.types import boolean, float32, float64, void
 from numba.core.types.npytypes import NumPyRandomGeneratorType
 from numba.experimental.function_type import FunctionModel
-from numba.extending import NativeValue, register_model, unbox
+from numba.extending import NativeValue, register_model, typeof_impl, unbox
 
 from rl_core.checks import fields, instance, integer, optional, require
 from rl_core.kernels.arrays import F32, F64
@@ -294,7 +294,15 @@ def _unbox(numba_type: Any, function: Any, c: Any) -> Any:
     return _NativeValue(found._getvalue())
 
 
+@cache
+def _kernel_type() -> Any:
+    functions = [_FirstClassType(signature) for signature in _SIGNATURES.values()]
+    return types.NamedTuple([*functions, float64[::1]], Kernel)  # type: ignore[no-untyped-call]
+
+
 unbox(_FirstClassType)(_unbox)  # type: ignore[no-untyped-call]
+# All kernels are of one type, which numba would else put together anew at every call.
+typeof_impl.register(Kernel, lambda kernel, context: _kernel_type())
 
 
 @cache
