@@ -158,15 +158,12 @@ def table() -> pd.DataFrame:
 
 SHORT = {"episodes": 1, "seeds": [0], "snapshots": (), "progress": None}
 WEIGHTS = {"layer0.weight": np.zeros((2, 3), np.float32)}
-CONTINUOUS = {"layer0.weight": np.zeros((2, 1), np.float32), "log_sigma": np.zeros(1, np.float32)}
 LINEAR = ReinforceConfig(network=MLP(()), max_episode_steps=9)
-DIRECT = ReinforceConfig(network=MLP(()), policy=Gaussian(mean="direct"))
 SMALL = DQNConfig(
     network=MLP(()), batch_size=4, memory_size=9, learning_starts=4, max_episode_steps=9
 )
 TABULAR = QLearningConfig(max_steps=9)
 BOX = spaces.Box(-1, 1, (2,))
-STATES = np.zeros((4, 2))
 DRAWN = {"level": 0.9, "resamples": 9}
 POLICY = policies.make_policy(Categorical(), (), 2, 3, 0)
 
@@ -180,7 +177,6 @@ CALLS: dict[str, Callable[[], dict[str, Any]]] = {
     "evaluation.Agent.predict": lambda: {"self": agent(), "observation": np.zeros(2), "state": None,
                                          "episode_start": None, "deterministic": False},
     "evaluation.Agent.save": lambda: {"self": agent(), "path": "agent.npz"},
-    "evaluation.action_values": lambda: {"weights": WEIGHTS, "observations": STATES},
     "evaluation.as_learned": lambda: {"config": LINEAR, "weights": WEIGHTS, "spaces": None,
                                       "env": None, "rng": None},
     "evaluation.check_fit": lambda: {"agent": uniform(2, 3), "world": open_world("MountainCar-v0")},
@@ -189,14 +185,11 @@ CALLS: dict[str, Callable[[], dict[str, Any]]] = {
     "evaluation.evaluation_streams": lambda: {"seed": 0},
     "evaluation.greedy": lambda: {"agent": uniform(2, 3)},
     "evaluation.load": lambda: {"path": saved(), "rng": None},
-    "evaluation.mean_actions": lambda: {"config": DIRECT, "weights": CONTINUOUS,
-                                        "observations": STATES},
     "evaluation.of_table": lambda: {"world": world(), "Q": np.zeros((9, 3)), "epsilon": 0.1},
     "evaluation.of_values": lambda: {"weights": WEIGHTS, "epsilon": 0.1},
     "evaluation.rollout": lambda: {"env": "MountainCar-v0", "agent": uniform(2, 3), "rng": rng(),
                                    "max_steps": 9},
     "evaluation.spaces_of": lambda: {"env": "MountainCar-v0"},
-    "evaluation.state_grid": lambda: {"space": BOX, "points": 3},
     "evaluation.uniform": lambda: {"n_observations": 2, "n_actions": 3},
     "experiments.arms.Arm": lambda: {"name": "a", "algorithm": reinforce, "env": "CartPole-v1",
                                      "config": LINEAR, "episodes": 1, "snapshots": (),

@@ -197,3 +197,8 @@ def test_a_long_value_is_cut_in_the_message():
     with pytest.raises(ValueError, match=r"^x must be short, got ") as caught:
         checks.require(False, "x", "a" * 10_000, "short")
     assert len(str(caught.value)) < 300
+
+
+def test_an_integer_that_no_float_holds_is_refused_by_name():
+    with pytest.raises(ValueError, match=r"^x must be .*, got array\(\[1000000"):
+        checks.floats("x", [10**400], (1,))

@@ -5,12 +5,12 @@ import pandas as pd
 import pytest
 
 from drawings import continuous as drawings
-from rl_core.evaluation import mean_actions
 from rl_core.policies import MLP, Gaussian
 from rl_core.reinforce import ReinforceConfig
 from studies import continuous as study
 from studies import continuous_causes as causes
 from studies import continuous_fates as what_became
+from studies.policy_maps import mean_actions
 
 EPISODES = 600
 SIGMA = 0.3

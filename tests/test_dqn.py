@@ -20,7 +20,6 @@ from toy_task import Corridor as CompiledCorridor
 
 from rl_core import modules
 from rl_core.dqn import DQNConfig, _make_learner, act, check_dqn, dqn, play
-from rl_core.evaluation import action_values
 from rl_core.experiments import Arm
 from rl_core.experiments import run as run_arms
 from rl_core.exploration import HalfWay, Linear, schedule_state
@@ -31,6 +30,7 @@ from rl_core.policies import MLP, Module
 from rl_core.training import spawn_streams, weights_of
 from rl_core.worlds.environments import TaskWorld, open_world
 from rl_core.worlds.shaping import Shaping, shape_for
+from studies.policy_maps import action_values
 
 SMALL = DQNConfig.report_2018(
     batch_size=40,

@@ -15,7 +15,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rl_core import modules, policies, reinforce
-from rl_core.evaluation import mean_actions
 from rl_core.experiments import Arm, run
 from rl_core.identity import describe
 from rl_core.kernels import likelihood, networks
@@ -24,6 +23,7 @@ from rl_core.reinforce import ReinforceConfig, TorchLearner, discounted_returns,
 from rl_core.training import spawn_streams, weights_of
 from rl_core.worlds.environments import open_world
 from rl_core.worlds.episodes import Trajectory, play_episode
+from studies.policy_maps import mean_actions
 
 TASKS = ("Acrobot-v1", "MountainCar-v0", "MountainCarContinuous-v0")
 CONFIGS = {

@@ -26,7 +26,7 @@ from drawings.look import (
 from drawings.reinforce import films
 from report.figure_data import tidy
 from report.seeds import SEEDS
-from rl_core.evaluation import Weights, as_learned, mean_actions, state_grid
+from rl_core.evaluation import Weights, as_learned
 from rl_core.experiments import Results
 from rl_core.reinforce import ReinforceConfig
 from rl_core.statistics import bootstrap_interval
@@ -45,6 +45,7 @@ from studies.continuous import (
     Curves,
 )
 from studies.continuous_fates import FATES
+from studies.policy_maps import mean_actions, state_grid
 from studies.shared import shown_agents
 
 EVERY = 10  # episodes between drawn points, after the first

@@ -23,11 +23,12 @@ from drawings.look import (
     median_band,
 )
 from drawings.reinforce import films
-from rl_core.evaluation import Rollout, Weights, action_values, of_values
+from rl_core.evaluation import Rollout, Weights, of_values
 from rl_core.experiments import Results
 from rl_core.training import weights_of
 from studies import dqn as study
 from studies.dqn import BUDGET, ENV, EPISODES, LEARNED, PARTS, Curves
+from studies.policy_maps import action_values
 from studies.shared import shown_agents
 
 PUSHES = ("left", "none", "right")

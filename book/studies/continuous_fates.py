@@ -7,13 +7,14 @@ import numpy as np
 import pandas as pd
 
 from report.seeds import SEEDS
-from rl_core.evaluation import as_learned, mean_actions, rollout
+from rl_core.evaluation import as_learned, rollout
 from rl_core.experiments import Results
 from rl_core.policies import MLP, Gaussian
 from rl_core.reinforce import ReinforceConfig
 from rl_core.training import weights_of
 from studies import shared
 from studies.continuous import ENV, EXTREME, VARIANTS, Curves
+from studies.policy_maps import mean_actions
 
 FATES = (
     "learned",
