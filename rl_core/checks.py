@@ -253,6 +253,8 @@ def floats(
     require(fits, name, given.shape, wanted)
     try:
         array = given.astype(np.float64)
+    except OverflowError:  # an integer that no float holds
+        _refuse(ValueError, name, given, wanted)
     except (TypeError, ValueError):
         _refuse(TypeError, name, given, wanted)
     wrong = ~np.isfinite(array) if finite else np.isnan(array)
