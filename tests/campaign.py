@@ -13,7 +13,6 @@ import math
 import pkgutil
 import re
 import sys
-import tempfile
 import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
@@ -143,11 +142,6 @@ def agent() -> Agent:
     return as_learned(LINEAR, WEIGHTS, spaces=spaces_of(where), env=where)
 
 
-def saved() -> str:
-    agent().save("saved.npz")
-    return "saved.npz"
-
-
 def settings(config: Any) -> dict[str, Any]:
     return {field.name: getattr(config, field.name) for field in fields(config) if field.init}
 
@@ -156,6 +150,7 @@ def table() -> pd.DataFrame:
     return pd.DataFrame({"seed": [0, 0], "episode": [1, 2], "steps": [9.0, 7.0]})
 
 
+SAVED = "saved.npz"  # an agent, where `main` makes the calls
 SHORT = {"episodes": 1, "seeds": [0], "snapshots": (), "progress": None}
 WEIGHTS = {"layer0.weight": np.zeros((2, 3), np.float32)}
 LINEAR = ReinforceConfig(network=MLP(()), max_episode_steps=9)
@@ -184,7 +179,7 @@ CALLS: dict[str, Callable[[], dict[str, Any]]] = {
                                     "episodes": 1, "max_steps": 9, "limit": 5, "measures": None},
     "evaluation.evaluation_streams": lambda: {"seed": 0},
     "evaluation.greedy": lambda: {"agent": uniform(2, 3)},
-    "evaluation.load": lambda: {"path": saved(), "rng": None},
+    "evaluation.load": lambda: {"path": SAVED, "rng": None},
     "evaluation.of_table": lambda: {"world": world(), "Q": np.zeros((9, 3)), "epsilon": 0.1},
     "evaluation.of_values": lambda: {"weights": WEIGHTS, "epsilon": 0.1},
     "evaluation.rollout": lambda: {"env": "MountainCar-v0", "agent": uniform(2, 3), "rng": rng(),
@@ -195,7 +190,7 @@ CALLS: dict[str, Callable[[], dict[str, Any]]] = {
                                      "config": LINEAR, "episodes": 1, "snapshots": (),
                                      "labels": {}},
     "experiments.runner.run": lambda: {"arms": [Arm("a", reinforce, "CartPole-v1", LINEAR, 1)],
-                                       "seeds": [0], "store": tempfile.mkdtemp(dir="."),
+                                       "seeds": [0], "store": "store",
                                        "workers": 1, "backend": "loky", "progress": False},
     "exploration.EpsilonGreedy": lambda: {"epsilon": 0.1},
     "exploration.Geometric": lambda: {"start": 1.0, "end": 0.1, "episodes": 3},
@@ -472,6 +467,7 @@ def _names(argument: str, message: str) -> bool:
 def main(share: int, shares: int, first: int) -> None:
     """Make every call of a share from number `first` on; write what comes of each."""
     warnings.simplefilter("ignore")
+    agent().save(SAVED)
     told = sys.stdout
     sys.stdout = sys.stderr  # what a function prints is not read
     for name in CALLS:  # compiles and imports what will be needed
