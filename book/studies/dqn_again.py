@@ -125,11 +125,15 @@ def learn(store: Path) -> Results:
     return run(arms(), seeds=FRESH, store=store)
 
 
-def learn_near(store: Path) -> Results:
-    """Run Acrobot's arms of 3i and 3k on the seeds that decide them."""
+def arms_near_a_bound() -> list[Arm]:
+    """Acrobot's arms of 3i and 3k."""
     names = [f"Acrobot, {variant}" for variant in JUDGED_AGAIN]
-    arms = [arm for arm in first.arms() if arm.name in names]
-    return run(arms, seeds=NEAR_A_BOUND, store=store)
+    return [arm for arm in first.arms() if arm.name in names]
+
+
+def learn_near(store: Path) -> Results:
+    """Run the arms of 3i and 3k on the seeds that decide them."""
+    return run(arms_near_a_bound(), seeds=NEAR_A_BOUND, store=store)
 
 
 def steps_a_goal(results: Results, arm: str) -> np.ndarray:

@@ -47,7 +47,7 @@ LIMITED_EPISODES = 2_000  # at most, under a time limit
 EPISODES = 100  # of evaluation, an agent and seed
 CAP = 5_000  # steps an episode of evaluation; a stopped one counts with these
 LEARNED = 500  # steps; an agent that learned needs at most so many on average
-FRESH = 100  # the first seed that nobody had seen when the criterion of t was changed
+FRESH = range(100, 100 + len(SEEDS))  # nobody had seen them when the criterion of t was changed
 TRAINED_EPSILON = 0.1  # share of random actions that DQN's training comes down to
 TIMED_SEEDS = 5  # of REINFORCE
 TIMED_EPISODES = 20  # of DQN, as in the report
@@ -146,15 +146,18 @@ def timed_arms(batch_size: int) -> list[Arm]:
     ]
 
 
+def slow_arms() -> list[Arm]:
+    """REINFORCE as reported, the time of which is taken on few seeds."""
+    return [arm for arm in reported_arms() if arm.name.endswith("REINFORCE")]
+
+
 def take_times(store: Path) -> pd.DataFrame:
     """Train the timed runs on seeds of their own: where they come from, a row an arm and seed.
 
     A run of REINFORCE takes several seconds and is far from its bound, so that it has fewer seeds.
     """
-    networks = [arm for arm in reported_arms() if arm.name.endswith("REINFORCE")]
-    seeds = range(FRESH, FRESH + len(SEEDS))
-    few = run(networks, seeds=seeds[:TIMED_SEEDS], store=store)
-    small = run([*timed_arms(512), *timed_arms(32)], seeds=seeds, store=store)
+    few = run(slow_arms(), seeds=FRESH[:TIMED_SEEDS], store=store)
+    small = run([*timed_arms(512), *timed_arms(32)], seeds=FRESH, store=store)
     return pd.concat([few.provenance, small.provenance], ignore_index=True)
 
 

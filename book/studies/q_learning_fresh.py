@@ -26,6 +26,7 @@ PROBABILITIES = {
     x: study.arm(f"exploitation {x:g}", exploration=study.EpsilonGreedy(round(1 - x, 6)))
     for x in study.EXPLOITATIONS
 }
+RISE_AND_HIGH = [PROBABILITIES[0.9], study.RISING_ARM]
 RESOLUTION = 0.05
 """What the curve of 2018 is known to. A target is excluded if every seed's curve is further off."""
 
@@ -54,7 +55,7 @@ def readings(world: World, store) -> tuple[dict[str, list[Evidence]], dict[str, 
     best = best_of(summary(world, list(arms.values()), CHOOSING, store))
     asked = {PROBABILITIES[x].name for x in (0.1, 0.2, 0.8, 0.9)} | set(best.values())
     judged = summary(world, [arms[name] for name in sorted(asked)], JUDGING, store)
-    many = summary(world, [PROBABILITIES[0.9], study.RISING_ARM], MANY, store)
+    many = summary(world, RISE_AND_HIGH, MANY, store)
     rise, high = (of(many, "earned", name) for name in (study.RISES, PROBABILITIES[0.9].name))
     low = of(judged, "error", PROBABILITIES[0.1].name)
     return (
