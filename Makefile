@@ -12,8 +12,10 @@ BIN := .venv/bin
 # What executes anything does so apart from the reader's settings; what is up to date is not made again.
 RUN := $(BIN)/python book/web/isolation.py
 STAMP := $(RUN) python book/web/stamp.py
-# In the order in which they are run: the appendices and the front page read what the chapters wrote.
+# The front page comes last.
 NOTEBOOKS := $(wildcard $(patsubst %,%.ipynb,$(shell sed -nE 's/^ *- file: *//p; s/^root: *//p' _toc.yml | sed '1{h;d};$$G')))
+CHAPTERS := $(wildcard book/[0-9]*.ipynb)
+NBMAKE = $(RUN) pytest --nbmake --nbmake-timeout=5400 -o faulthandler_timeout=0 --durations=0
 SITE := _build/html
 # The setting the site was built with is part of the stamp's name: a preview is never taken for the book.
 COMPLETE := $(SITE)/.complete-$(or $(SEEDS),30)-seeds
@@ -88,13 +90,16 @@ types: setup ## types (mypy, strict)
 	$(BIN)/mypy
 
 unit: setup ## unit tests and the examples in the docstrings
-	$(RUN) pytest
+	$(RUN) pytest --numprocesses=logical --dist=loadfile
 
 pairing: setup ## each notebook says the same as its .py twin and holds no outputs
 	$(RUN) pytest tests/pairing.py
 
+# The chapters on all cores; then one after the other what reads the results of them all.
 notebooks: setup ## every notebook at full scale (nbmake)
-	$(RUN) pytest --nbmake --nbmake-timeout=5400 -o faulthandler_timeout=0 --durations=0 $(NOTEBOOKS)
+	$(RUN) bash -c 'cd book && python -m studies.everything'
+	$(NBMAKE) --numprocesses=logical $(CHAPTERS)
+	$(NBMAKE) $(filter-out $(CHAPTERS),$(NOTEBOOKS))
 
 browser: book ## the built book: claims, links; in a headless Chromium pictures, mathematics, films, search
 	$(RUN) pytest tests/built_book.py tests/browser.py tests/interactive_browser.py

@@ -1,12 +1,17 @@
-"""What is copied for a preview and for a chapter alone."""
+"""What is copied for a build, how the notebooks are executed, and what is said of it."""
 
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import announce
 import build
+import nbformat
 import pytest
 import yaml
+
+CONFIG = Path(__file__).parent.parent / "_config.yml"
 
 
 @pytest.fixture
@@ -58,14 +63,46 @@ def test_it_is_said_by_any_python_before_there_is_an_environment():
     assert "make book SEEDS=3" in said
 
 
-def test_the_whole_book_has_a_progress(capfd):
-    lines = "x.ipynb: Executing notebook using local CWD [mystnb]", "something else"
-    code = f"print({lines[0]!r}); print({lines[1]!r}); print({lines[0]!r}); raise SystemExit(3)"
-    assert build.run([sys.executable, "-c", code], 11) == 3
+@pytest.fixture
+def write(tmp_path):
+    """Write a notebook of one cell."""
+
+    def write(name, source):
+        cells = [nbformat.v4.new_code_cell(source)]
+        path = tmp_path / name
+        nbformat.write(nbformat.v4.new_notebook(cells=cells), path)
+        return path
+
+    return write
+
+
+def test_notebooks_are_executed_where_they_lie(write, capfd):
+    save = "from pathlib import Path; Path('x').write_text('1'); print('from', 'a chapter')"
+    read = "print(Path('x').read_text() + '2')"
+    paths = [write("intro.ipynb", f"from pathlib import Path; {read}"), write("01.ipynb", save)]
+    assert build.execute_all(paths) == 0
+    shown = [nbformat.read(path, 4).cells[0].outputs[0].text for path in paths]
+    assert shown == ["12\n", "from a chapter\n"]
     said = capfd.readouterr().out
-    assert "something else" in said
-    assert "notebook 1 of 11" in said
-    assert "notebook 2 of 11" in said
+    assert "01.ipynb, 1 of 2" in said
+    assert "intro.ipynb, 2 of 2" in said
+
+
+def test_a_notebook_that_fails_is_named_and_ends_the_build(write, capfd):
+    paths = [write("01.ipynb", "raise ValueError('by intent')"), write("intro.ipynb", "1")]
+    assert build.execute_all(paths) == 1
+    said = capfd.readouterr()
+    assert "01.ipynb" in said.err
+    assert "by intent" in said.err
+    assert not nbformat.read(paths[1], 4).cells[0].outputs
+
+
+def test_what_was_executed_is_not_executed_again(root):
+    shutil.copy(CONFIG, root)
+    copy = build.copied(root / "_build/source", preview=True, only=[])
+    assert (
+        yaml.safe_load((copy / "_config.yml").read_text())["execute"]["execute_notebooks"] == "off"
+    )
 
 
 @pytest.mark.parametrize(("seeds", "only", "offered"), [("30", [], True), ("3", [], False)])

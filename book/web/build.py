@@ -9,10 +9,14 @@ import shutil
 import subprocess
 import sys
 import time
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 import pictures
 from announce import FULL, announce
+from joblib import cpu_count
+from stamp import run
 
 ROOT = Path(__file__).parents[2]
 STRICT = ("--warningiserror", "--nitpick", "--keep-going")
@@ -28,6 +32,11 @@ def copied(folder: Path, *, preview: bool, only: list[str]) -> Path:
     for name in ("_config.yml", "_toc.yml"):
         folder.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, folder)
+    config = folder / "_config.yml"
+    text = config.read_text(encoding="utf-8")
+    # The notebooks are executed before, several at once, and hold their outputs then.
+    executed = text.replace("execute_notebooks: force", 'execute_notebooks: "off"')
+    config.write_text(executed, encoding="utf-8")
     shutil.copytree(ROOT / "book", folder / "book")
     if only:
         root, *others = only
@@ -41,47 +50,73 @@ def copied(folder: Path, *, preview: bool, only: list[str]) -> Path:
     return folder
 
 
-def run(command: list[str], notebooks: int) -> int:
-    """Run a build, pass on what it says, and tell how far the whole book is; return its exit code.
+def stages(notebooks: Iterable[Path]) -> list[list[Path]]:
+    """Notebooks that can be executed at once: the chapters, and one by one what reads of them all.
 
-    If interrupted, let it end by itself first.
+    Examples
+    --------
+    >>> names = ["intro", "02_learning", "a1_reproduce", "01_maze"]
+    >>> [[path.name for path in stage] for stage in stages(Path(name) for name in names)]
+    [['01_maze', '02_learning'], ['a1_reproduce'], ['intro']]
     """
-    begun, start = 0, time.monotonic()
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, errors="replace") as process:
-        assert process.stdout is not None
+    paths = sorted(notebooks)
+    chapters = [path for path in paths if path.name[0].isdigit()]
+    return [chapters, *([path] for path in paths if path not in chapters)]
+
+
+def execute(notebook: Path) -> int:
+    """Execute a notebook where it lies and write the outputs into it; return an exit code."""
+    program = "from nbclient.cli import main; main()"  # jupyter execute, of this Python
+    command = [sys.executable, "-c", program, "--inplace", "--kernel_name=python3", "--timeout=-1"]
+    done = subprocess.run([*command, str(notebook)], capture_output=True, text=True, check=False)
+    if done.returncode > 0:
+        print(f"{notebook.name}:\n{done.stderr}", file=sys.stderr, flush=True)
+    return done.returncode
+
+
+def execute_all(notebooks: Iterable[Path]) -> int:
+    """Execute notebooks on all cores, and tell how far the whole is; return an exit code.
+
+    After one that failed, or Ctrl-C, no other is begun; those at work end by themselves.
+    """
+    ordered, start, count = stages(notebooks), time.monotonic(), 0
+    with ThreadPoolExecutor(cpu_count()) as pool:
         try:
-            for line in process.stdout:
-                print(line, end="", flush=True)
-                if "Executing notebook using" in line:
-                    begun += 1
+            for stage in ordered:
+                futures = {pool.submit(execute, path): path for path in stage}
+                for future in as_completed(futures):
+                    if future.result():
+                        return future.result()
+                    count += 1
                     passed = (time.monotonic() - start) / 60
-                    print(
-                        f"--- notebook {begun} of {notebooks}, after {passed:.0f} min", flush=True
-                    )
-            return process.wait()
-        except KeyboardInterrupt:  # the command got it too
-            process.wait()
-            raise
+                    name, total = futures[future].name, sum(map(len, ordered))
+                    print(f"--- {name}, {count} of {total}, after {passed:.1f} min", flush=True)
+        finally:
+            pool.shutdown(cancel_futures=True)
+    return 0
 
 
 def build(seeds: int, only: list[str]) -> int:
-    """Execute and build; return an exit code.
+    """Train, execute and build; return an exit code.
 
     Always from nothing: an incremental build passes over warnings in pages that it does not read
     again. Pages built alone may have links that lead nowhere, so warnings are let pass there.
     """
-    source = target = ROOT
-    if only:
-        target = ROOT / "_build" / "chapter"
-        shutil.rmtree(target, ignore_errors=True)
-    else:
+    target = ROOT / "_build" / "chapter" if only else ROOT
+    shutil.rmtree(target if only else ROOT / "_build", ignore_errors=True)
+    source = copied(target / "_build" / "source", preview=seeds != FULL, only=only)
+    notebooks = [source / "book" / f"{name}.ipynb" for name in only]
+    train = ["python", "-m", "studies.everything"]
+    page = ["jupyter-book", "build", str(source), "--path-output", str(target)]
+    if not only:
         announce(seeds)
-        shutil.rmtree(ROOT / "_build", ignore_errors=True)
-    if only or seeds != FULL:
-        source = copied(target / "_build" / "source", preview=seeds != FULL, only=only)
-    command = ["jupyter-book", "build", str(source), "--path-output", str(target)]
-    notebooks = len(only) or len(list((source / "book").glob("*.ipynb")))
-    code = run(command if only else [*command, *STRICT], notebooks)
+        notebooks = list((source / "book").glob("*.ipynb"))
+        page += STRICT
+    code = (
+        (not only and run(train, cwd=source / "book"))
+        or execute_all(notebooks)
+        or run(page, cwd=ROOT)
+    )
     lost = [] if code else pictures.missing(source / "book", target / "_build" / "html" / "book")
     print("\n".join(lost), file=sys.stderr)
     if only and not code:

@@ -41,9 +41,9 @@ def digest(paths: Iterable[Path], also: str = "") -> str:
     return total.hexdigest()
 
 
-def run(command: list[str]) -> int:
-    """Run a command and return its exit code; if interrupted, let it end by itself first."""
-    with subprocess.Popen(command) as process:
+def run(command: list[str], folder: Path | None = None) -> int:
+    """Run a command, perhaps in a folder, and return its exit code; Ctrl-C waits until it ends."""
+    with subprocess.Popen(command, cwd=folder) as process:
         try:
             return process.wait()
         except KeyboardInterrupt:  # the command got it too
