@@ -220,7 +220,8 @@ with tempfile.TemporaryDirectory() as folder:
     results.table.to_csv(Path(folder) / "room.csv", index=False)
 
 # %% [markdown]
-# Neither library is needed here, so what follows is not run on this page; a test runs it. With rliable:
+# Neither library is needed here, so what follows is not run on this page; a test runs it. With rliable (1.2.0 does not work beside pandas 3: take the matrices to an
+# environment with `arch==7.2.0` and `pandas==2.3.3`):
 #
 # ```python
 # import numpy as np

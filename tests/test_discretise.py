@@ -144,7 +144,7 @@ def test_levels_of_actions():
     [
         *(None, 0.5, "ab", [0.1], [0.1, 0.2, 0.3], np.zeros(3), np.zeros((1, 2)), np.zeros(60)),
         *([np.nan, 0.0], np.array([0.0, np.nan]), np.array(["a", "b"]), [[1.0], [1.0, 2.0]]),
-        *([None, 1.0], np.array([1j, 0]), {}, object()),
+        *([None, 1.0], np.array([1j, 0]), {}, pytest.param(object(), id="object")),
     ],
     ids=repr,
 )
