@@ -102,7 +102,7 @@ notebooks: setup ## every notebook at full scale (nbmake)
 	$(NBMAKE) $(filter-out $(CHAPTERS),$(NOTEBOOKS))
 
 browser: book ## the built book: claims, links; in a headless Chromium pictures, mathematics, films, search
-	$(RUN) pytest tests/built_book.py tests/browser.py tests/interactive_browser.py
+	$(RUN) pytest --numprocesses=logical --dist=worksteal tests/built_book.py tests/browser.py tests/interactive_browser.py
 
 hostile: setup ## a small book built among hostile settings has the same pictures and claims
 	$(RUN) pytest tests/hostile.py
