@@ -57,6 +57,11 @@ STILLS = """
       document.querySelectorAll('.play-films').forEach(it => it.remove());
       for (const film of document.querySelectorAll('video')) {
         await new Promise(done => {
+          film.addEventListener('loadedmetadata', done, {once: true});
+          film.preload = 'auto';
+          film.load();
+        });
+        await new Promise(done => {
           film.addEventListener('seeked', done, {once: true});
           film.currentTime = film.duration / 2;
         });
