@@ -100,6 +100,12 @@ def test_what_stands_inside_a_page_becomes_a_file_beside_it(page, tmp_path):
     assert 'preload="none"' in text
 
 
+def test_cells_have_no_address_that_nobody_asks_for():
+    cells = ['<td id="T_table-1-1_row0_col0" class="x">', '<td id="T_table-1-1_row1_col0">']
+    text = f"<style>#T_table-1-1_row1_col0 {{ }}</style><table id='T_table-1-1'>{''.join(cells)}"
+    assert website.unnamed(text) == text.replace(cells[0], '<td class="x">')
+
+
 def test_formulas_are_left_for_later(page):
     script = '<script defer="defer" src="../_static/mathjax/tex-chtml.js"></script>'
     text = website.lightened(HEAD.replace("</head>", f"{script}</head>"), page)

@@ -45,8 +45,11 @@ def captioned(
     styled = styled.set_caption(html.escape(caption, quote=False)).hide(axis="index")
     styled = styled.format(dict(formats or {}), escape="html").format_index(escape="html", axis=1)
     words = [i for i, kind in enumerate(table.dtypes) if not pd.api.types.is_numeric_dtype(kind)]
-    left = [CSSDict(selector=f".col{i}", props="text-align: left") for i in words]
-    styled = styled.set_table_styles(left)
+    # Names of arms are long, and what stands beside them longer.
+    left = {i: "min-width: min(16em, 30vw);" * (table.columns[i] == "arm") for i in words}
+    styled = styled.set_table_styles(
+        [CSSDict(selector=f".col{i}", props=f"{wide} text-align: left") for i, wide in left.items()]
+    )
     if boldest:
         styled = styled.highlight_max(subset=list(boldest), axis=1, props="font-weight: bold")
     return styled
