@@ -8,7 +8,9 @@
     const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
     if (target && !moved) target.scrollIntoView();
   };
-  const painted = () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done))));
+  // Between two pieces of work the page answers its reader.
+  const pause = () => new Promise((done) => setTimeout(done));
+  const frame = () => new Promise((done) => requestAnimationFrame(done));
   const run = (attributes) =>
     new Promise((done) => {
       const script = document.createElement("script");
@@ -18,6 +20,13 @@
       script.onload = script.onerror = done;
       document.head.append(script);
     });
+  // A formula too wide for its line is set smaller, down to four fifths of the text around it.
+  const fit = (it) => {
+    const formula = it.querySelector('mjx-container[display="true"]');
+    if (!formula || formula.scrollWidth <= formula.clientWidth) return;
+    const size = (parseFloat(formula.style.fontSize) * formula.clientWidth) / formula.scrollWidth;
+    formula.style.fontSize = `${Math.max(80, Math.floor(size))}%`;
+  };
   async function formulas() {
     const mathjax = document.querySelector('meta[name="mathjax"]');
     if (!mathjax) return;
@@ -29,7 +38,8 @@
     const below = all.filter((it) => it.getBoundingClientRect().top > innerHeight);
     for (const some of [all.filter((it) => !below.includes(it)), ...below.map((it) => [it])]) {
       await MathJax.typesetPromise(some);
-      await new Promise((done) => setTimeout(done));
+      some.forEach(fit);
+      await pause();
     }
   }
   // Of a film its first picture, when it comes near.
@@ -38,10 +48,15 @@
   }, { rootMargin: "800px" });
   addEventListener("load", async () => {
     land();
-    await painted();
+    await frame();
+    await frame();
+    await pause();
     const scripts = [...document.querySelectorAll('script[type="text/late"]')];
     await Promise.all(scripts.map((it) => run(it.attributes)));
-    window.play?.build();
+    for (const host of window.play?.hosts() ?? []) {
+      play.build([host]);
+      await pause();
+    }
     land();
     for (const film of document.querySelectorAll("video")) near.observe(film);
     await formulas();

@@ -45,11 +45,16 @@ def captioned(
     styled = styled.set_caption(html.escape(caption, quote=False)).hide(axis="index")
     styled = styled.format(dict(formats or {}), escape="html").format_index(escape="html", axis=1)
     words = [i for i, kind in enumerate(table.dtypes) if not pd.api.types.is_numeric_dtype(kind)]
-    # Names of arms are long, and what stands beside them longer.
-    left = {i: "min-width: min(16em, 30vw);" * (table.columns[i] == "arm") for i in words}
+    props = {i: f"text-align: left; min-width: {_room(table.iloc[:, i])}" for i in words}
     styled = styled.set_table_styles(
-        [CSSDict(selector=f".col{i}", props=f"{wide} text-align: left") for i, wide in left.items()]
+        [CSSDict(selector=f".col{i}", props=text) for i, text in props.items()]
     )
     if boldest:
         styled = styled.highlight_max(subset=list(boldest), axis=1, props="font-weight: bold")
     return styled
+
+
+def _room(words: pd.Series) -> str:
+    """Return the width that a column of words has at least: it shall not break at every word."""
+    longest = max(map(len, words.astype(str)), default=0)
+    return f"min({longest / 2:g}em, {16 if words.name == 'arm' else 10}em, 30vw)"

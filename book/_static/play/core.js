@@ -154,8 +154,9 @@ window.play = (() => {
     return points.length ? `M${points.join("L")}Z` : "";
   }
 
-  function build() {
-    for (const host of document.querySelectorAll("[data-play]:not(.play-on)")) {
+  const hosts = () => document.querySelectorAll("[data-play]:not(.play-on)");
+  function build(some = hosts()) {
+    for (const host of some) {
       const kind = widgets[host.dataset.play];
       if (!kind) continue;
       const live = el("div", { class: "play-live" });
@@ -164,7 +165,7 @@ window.play = (() => {
       host.classList.add("play-on");
     }
   }
-  document.addEventListener("DOMContentLoaded", build); // in the book `late.js` does it
+  document.addEventListener("DOMContentLoaded", () => build()); // in the book `late.js` does it
 
-  return { build, widgets, el, svg, fixed, grouped, brief, doubles, floats, choice, slider, rove, chart, path, band };
+  return { hosts, build, widgets, el, svg, fixed, grouped, brief, doubles, floats, choice, slider, rove, chart, path, band };
 })();
