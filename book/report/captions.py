@@ -55,6 +55,7 @@ def captioned(
 
 
 def _room(words: pd.Series) -> str:
-    """Return the width that a column of words has at least: it shall not break at every word."""
+    """Return the width that a column of words has at least: not every word on a line of its own."""
     longest = max(map(len, words.astype(str)), default=0)
-    return f"min({longest / 2:g}em, {16 if words.name == 'arm' else 10}em, 30vw)"
+    most, of_window = (20, 60) if longest > 150 else (16 if words.name == "arm" else 10, 30)
+    return f"min({longest / 2:g}em, {most}em, {of_window}vw)"
