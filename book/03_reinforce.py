@@ -83,9 +83,9 @@ premise("what is seen is the whole state", furthest < 1e-6)
 # two hidden layers of 10 and 20 rectified linear units, then a softmax. After an episode
 # $s_0, a_0, r_1, s_1, \dots, s_T$ every action is weighed by the discounted sum of the rewards that followed it,
 #
-# $$v_t = \sum_{k=t}^{T-1} \gamma^{k-t} r_{k+1}, \qquad
+# $$\begin{gathered} v_t = \sum_{k=t}^{T-1} \gamma^{k-t} r_{k+1}, \\
 # \boldsymbol\theta \leftarrow \boldsymbol\theta + \alpha \nabla_{\boldsymbol\theta}
-# \frac{1}{|B|} \sum_{t \in B} v_t \ln \pi(a_t \mid s_t, \boldsymbol\theta).$$
+# \frac{1}{|B|} \sum_{t \in B} v_t \ln \pi(a_t \mid s_t, \boldsymbol\theta). \end{gathered}$$
 #
 # In an episode of three steps, each with reward $-1$, and with $\gamma = 0.99$, that is
 # $v_2 = -1$, $v_1 = -1 - 0.99 = -1.99$ and $v_0 = -1 - 0.99 \cdot 1.99 = -2.97$.

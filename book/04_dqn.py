@@ -61,8 +61,8 @@ glue("seeds", len(study.SEEDS), display=False)
 # largest value, or, with probability $\varepsilon$, any. Every step $(s, a, r, s')$ goes into a memory of the latest
 # 3,000 (Acrobot) or 4,000 steps (MountainCar). After each step a batch $B$ is drawn from it, and the network is moved towards
 #
-# $$y = r + \gamma \max_{a'} Q(s', a'; \boldsymbol\theta^-), \qquad
-# L(\boldsymbol\theta) = \frac{1}{|B|} \sum_{B} \bigl(y - Q(s, a; \boldsymbol\theta)\bigr)^2,$$
+# $$\begin{gathered} y = r + \gamma \max_{a'} Q(s', a'; \boldsymbol\theta^-), \\
+# L(\boldsymbol\theta) = \frac{1}{|B|} \sum_{B} \bigl(y - Q(s, a; \boldsymbol\theta)\bigr)^2, \end{gathered}$$
 #
 # where $\boldsymbol\theta^-$ is a copy of the weights that is renewed every 300 updates only. The report has both, the memory (experience replay) and the copy (fixed Q-targets), from D. Silver's course
 # (see the [references](references.md)). The lines that do it:

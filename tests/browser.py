@@ -158,16 +158,18 @@ def test_pictures_are_there_and_described(visit):
 
 
 def test_nothing_holds_up_the_page(visit):
-    """But a script of few bytes; mathematics is loaded where there are formulas, and only there."""
-    blocking, mathjax, formulas = visit.page.evaluate(
+    """What is asked for before the first picture is one style sheet and the script that waits."""
+    early, mathjax, formulas = visit.page.evaluate(
         """() => [
-          [...document.head.querySelectorAll('script[src]')].filter(it => !it.defer && !it.async)
-            .map(it => performance.getEntriesByName(it.src)[0]?.decodedBodySize ?? 0),
+          performance.getEntriesByType('resource').filter(it => it.startTime <
+            performance.getEntriesByName('first-contentful-paint')[0].startTime)
+            .map(it => it.name.replace(/.*_static.|[?].*/g, '')),
           document.querySelectorAll('script[src*=mathjax]').length,
           document.querySelectorAll('article .math').length,
         ]"""
     )
-    assert sum(blocking) < 2_000
+    asked = [name for name in early if not name.startswith("data:") and ".png" not in name]
+    assert sorted(asked) == ["book.css", "late.js"]
     assert bool(mathjax) == bool(formulas)
 
 
@@ -342,6 +344,21 @@ def test_the_page_fits_its_window(view, path):
     )
     assert wide <= window
     assert theme == ("dark" if view.page.evaluate(DARK) else "light")
+
+
+@pytest.mark.parametrize("path", PAGES)
+def test_captions_and_formulas_fit_and_can_be_read(view, path):
+    """A caption is in sight as a whole, and a formula not much smaller than the text."""
+    wide, small = view.go(path).find(
+        """
+        const wide = [...article.querySelectorAll('table caption')]
+          .filter(it => it.getBoundingClientRect().right > innerWidth).map(it => it.textContent);
+        const small = [...article.querySelectorAll('mjx-container[display]')]
+          .filter(it => parseFloat(getComputedStyle(it).fontSize) < 12.7).map(it => it.outerHTML);
+        return [wide, small];
+        """
+    )
+    assert (wide, small) == ([], [])
 
 
 CONTRAST = """

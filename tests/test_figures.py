@@ -87,6 +87,14 @@ def test_a_table_has_an_address():
     assert '<table id="T_table-3-1">' in page
 
 
+def test_words_have_room_and_names_of_arms_more():
+    rows = pd.DataFrame({"met": ["yes"], "arm": ["a" * 60], "what": ["a " * 40], "n": [1]})
+    page = captioned(rows, "Table 0.").to_html()
+    for width in ("min(1.5em, 10em, 30vw)", "min(30em, 16em, 30vw)", "min(40em, 10em, 30vw)"):
+        assert f"min-width: {width}" in page
+    assert page.count("min-width") == 3
+
+
 HOSTILE = '<script>alert("1")</script>&'
 
 

@@ -24,18 +24,44 @@ def page(tmp_path):
 )
 def test_a_picture_gets_its_size(page, source):
     text = website.lightened(f'{HEAD}<img alt="x" src="{source}" />', page)
-    assert f'<img width="640" height="480" alt="x" src="{source}" />' in text
+    assert f'<img loading="lazy" width="640" height="480" alt="x" src="{source}" />' in text
 
 
 @pytest.mark.parametrize("tag", ['<img width="3" src="chart.png">', '<img src="lost.png">'])
 def test_a_picture_that_has_a_size_or_is_not_there_stays(page, tag):
-    assert website.lightened(HEAD + tag, page).endswith(tag)
+    waiting = tag.replace("<img", '<img loading="lazy"')
+    assert website.lightened(HEAD + tag, page).endswith(waiting)
 
 
-def test_scripts_wait_but_for_the_first(page):
+def test_no_script_is_asked_for_before_the_page_is_painted(page):
+    (page.parent / "documentation_options.js").write_text("const SETTINGS = 1;")
     text = website.lightened(HEAD, page)
-    assert '<script src="documentation_options.js">' in text
-    assert '<script defer src="a.js">' in text
+    assert "<script>const SETTINGS = 1;</script>" in text
+    assert '<script type="text/late" src="a.js">' in text
+
+
+@pytest.mark.parametrize(
+    ("name", "mark"),
+    [
+        ("play/maze.js", '<div data-play="maze">'),
+        ("copybutton.js", '<div class="highlight">'),
+        ("togglebutton.js", '<div class="admonition tip dropdown">'),
+    ],
+)
+def test_a_script_is_only_where_there_is_something_for_it(page, name, mark):
+    head = f'<head><script src="_static/{name}?v=1"></script></head>'
+    assert name not in website.lightened(f'{head}<div class="dropdown toggle-x">', page)
+    assert f'<script type="text/late" src="_static/{name}?v=1">' in website.lightened(
+        head + mark, page
+    )
+
+
+def test_night_falls_before_the_first_picture(page):
+    """Not when the theme's script comes, after a flash of light."""
+    text = website.lightened(HEAD.replace("</head>", f"<script>{website.THEME}</script>"
+        "</head>"), page)  # fmt: skip
+    assert "prefers-color-scheme: dark" in text
+    assert website.THEME not in text
 
 
 def test_the_icon_scripts_are_gone(page):
@@ -71,15 +97,20 @@ def test_what_stands_inside_a_page_becomes_a_file_beside_it(page, tmp_path):
     picture, again, movie = re.findall(r'src="\.\./_images/(\w+\.\w+)"', text)
     assert picture == again != movie
     assert (tmp_path / "_images" / movie).read_bytes() == PNG
-    assert text.count('<img loading="lazy" ') == 2
-    assert 'preload="metadata"' in text
+    assert 'preload="none"' in text
+
+
+def test_cells_have_no_address_that_nobody_asks_for():
+    cells = ['<td id="T_table-1-1_row0_col0" class="x">', '<td id="T_table-1-1_row1_col0">']
+    text = f"<style>#T_table-1-1_row1_col0 {{ }}</style><table id='T_table-1-1'>{''.join(cells)}"
+    assert website.unnamed(text) == text.replace(cells[0], '<td class="x">')
 
 
 def test_formulas_are_left_for_later(page):
     script = '<script defer="defer" src="../_static/mathjax/tex-chtml.js"></script>'
     text = website.lightened(HEAD.replace("</head>", f"{script}</head>"), page)
     assert script not in text
-    assert '<meta name="mathjax" content="../_static/mathjax/tex-chtml.js" />' in text
+    assert '<meta name="mathjax" content="../_static/mathjax/startup.js" />' in text
 
 
 def test_of_the_styles_only_what_can_be_used_stays():
@@ -97,6 +128,23 @@ def test_of_the_styles_only_what_can_be_used_stays():
     assert left.startswith("p:not(.nowhere) > .a{")
     assert "@font-face { font-family: x }" in left
     assert '.b-c:is(.nowhere, .a),.w-1\\/2{ content: ".nowhere { }" }' in left
+
+
+def test_all_styles_are_in_one_sheet(tmp_path):
+    static = tmp_path / "_static"
+    static.mkdir()
+    (static / "a.css").write_text('@charset "UTF-8";@import "b.css"; .a  { top: 0 } /* of a */')
+    (static / "b.css").write_text(".b { content: '/*  */' }")
+    (static / "c.css").write_text(".c { top: 1px }")
+    sheets = [f'<link href="../_static/{name}.css?v=1" rel="stylesheet" />' for name in "ac"]
+    page = tmp_path / "book" / "page.html"
+    page.parent.mkdir()
+    page.write_text(f"<head><title>x</title>{''.join(sheets)}</head>")
+    styles.join(tmp_path, [page])
+    (sheet,) = static.iterdir()
+    assert sheet.read_text() == ".b { content: '/*  */' } .a { top: 0 }  .c { top: 1px }"
+    link = rf'<head><title>x</title><link rel="stylesheet" href="../_static/{sheet.name}\?v=\w+" />'
+    assert re.fullmatch(link + "</head>", page.read_text())
 
 
 def test_a_link_to_a_caption_leads_to_what_stands_above_it():

@@ -1,5 +1,5 @@
-// Formulas come last, when the page has been painted. A link lands again once all above its target
-// has its size, unless the reader has moved on.
+// What a page says is painted first. Then come the scripts, in their order, and the formulas. A link
+// lands again once all above its target has its size, unless the reader has moved on.
 (() => {
   let moved = false;
   for (const kind of ["wheel", "touchmove", "keydown", "pointerdown"])
@@ -8,28 +8,59 @@
     const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
     if (target && !moved) target.scrollIntoView();
   };
-  const set = () => {
-    const formulas = document.querySelector('meta[name="mathjax"]');
-    if (!formulas) return;
-    const script = document.createElement("script");
-    script.src = formulas.content;
-    script.onload = async () => {
-      await MathJax.startup.promise;
-      // What is in sight or above it at once; below, one by one: the page can be used meanwhile.
-      const all = [...document.querySelectorAll(".math")];
-      const below = all.filter((it) => it.getBoundingClientRect().top > innerHeight);
-      for (const some of [all.filter((it) => !below.includes(it)), ...below.map((it) => [it])]) {
-        await MathJax.typesetPromise(some);
-        await new Promise((done) => setTimeout(done));
-      }
-      document.documentElement.dataset.formulas = "set";
-      land();
-    };
-    MathJax.startup = { typeset: false };
-    document.head.append(script);
+  // Between two pieces of work the page answers its reader.
+  const pause = () => new Promise((done) => setTimeout(done));
+  const frame = () => new Promise((done) => requestAnimationFrame(done));
+  const run = (attributes) =>
+    new Promise((done) => {
+      const script = document.createElement("script");
+      for (const { name, value } of attributes) script.setAttribute(name, value);
+      script.type = "text/javascript";
+      script.async = false;
+      script.onload = script.onerror = done;
+      document.head.append(script);
+    });
+  // A formula too wide for its line is set smaller, down to four fifths of the text around it.
+  const fit = (it) => {
+    const formula = it.querySelector('mjx-container[display="true"]');
+    if (!formula || formula.scrollWidth <= formula.clientWidth) return;
+    const size = (parseFloat(formula.style.fontSize) * formula.clientWidth) / formula.scrollWidth;
+    formula.style.fontSize = `${Math.max(80, Math.floor(size))}%`;
   };
-  addEventListener("load", () => {
+  async function formulas() {
+    const mathjax = document.querySelector('meta[name="mathjax"]');
+    if (!mathjax) return;
+    MathJax.startup = { typeset: false };
+    await run([{ name: "src", value: mathjax.content }]);
+    await MathJax.startup.promise;
+    // What is in sight or above it at once; below, one by one: the page can be used meanwhile.
+    const all = [...document.querySelectorAll(".math")];
+    const below = all.filter((it) => it.getBoundingClientRect().top > innerHeight);
+    for (const some of [all.filter((it) => !below.includes(it)), ...below.map((it) => [it])]) {
+      await MathJax.typesetPromise(some);
+      some.forEach(fit);
+      await pause();
+    }
+  }
+  // Of a film its first picture, when it comes near.
+  const near = new IntersectionObserver((films) => {
+    for (const { target, isIntersecting } of films) if (isIntersecting) target.preload = "metadata";
+  }, { rootMargin: "800px" });
+  addEventListener("load", async () => {
     land();
-    requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(set)));
+    await frame();
+    await frame();
+    await pause();
+    const scripts = [...document.querySelectorAll('script[type="text/late"]')];
+    await Promise.all(scripts.map((it) => run(it.attributes)));
+    for (const host of window.play?.hosts() ?? []) {
+      play.build([host]);
+      await pause();
+    }
+    land();
+    for (const film of document.querySelectorAll("video")) near.observe(film);
+    await formulas();
+    document.documentElement.dataset.formulas = "set";
+    land();
   });
 })();

@@ -1,5 +1,5 @@
 // Tables of class "sortable": a click on a heading sorts the rows by it, a second one backwards.
-document.addEventListener("DOMContentLoaded", () => {
+(() => {
   // A number only if the whole first word is one: "3a" is a name. The interval behind it is ignored.
   const number = (text) => {
     const [word] = text.replace(/^[-−]/, "-").split(/\s/, 1);
@@ -25,4 +25,4 @@ document.addEventListener("DOMContentLoaded", () => {
       });
     });
   }
-});
+})();

@@ -172,6 +172,7 @@ class Film:
             same = picture.shape == pictures[0].shape
             require(same, name, picture.shape, f"of the shape of the first, {pictures[0].shape}")
         self.description = description
+        self.height, self.width = (side - side % 2 for side in pictures[0].shape[:2])
         self.mp4 = _encode(pictures, frames_per_second)
 
     def _repr_html_(self) -> str:
@@ -179,7 +180,8 @@ class Film:
         text = html.escape(self.description, quote=True)
         return (
             f'<video controls loop muted playsinline preload="auto" aria-label="{text}" '
-            f'title="{text}" src="data:video/mp4;base64,{data}"></video>'
+            f'width="{self.width}" height="{self.height}" title="{text}" '
+            f'src="data:video/mp4;base64,{data}"></video>'
         )
 
 

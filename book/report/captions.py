@@ -45,8 +45,17 @@ def captioned(
     styled = styled.set_caption(html.escape(caption, quote=False)).hide(axis="index")
     styled = styled.format(dict(formats or {}), escape="html").format_index(escape="html", axis=1)
     words = [i for i, kind in enumerate(table.dtypes) if not pd.api.types.is_numeric_dtype(kind)]
-    left = [CSSDict(selector=f".col{i}", props="text-align: left") for i in words]
-    styled = styled.set_table_styles(left)
+    props = {i: f"text-align: left; min-width: {_room(table.iloc[:, i])}" for i in words}
+    styled = styled.set_table_styles(
+        [CSSDict(selector=f".col{i}", props=text) for i, text in props.items()]
+    )
     if boldest:
         styled = styled.highlight_max(subset=list(boldest), axis=1, props="font-weight: bold")
     return styled
+
+
+def _room(words: pd.Series) -> str:
+    """Return the width that a column of words has at least: not every word on a line of its own."""
+    longest = max(map(len, words.astype(str)), default=0)
+    most, of_window = (20, 60) if longest > 150 else (16 if words.name == "arm" else 10, 30)
+    return f"min({longest / 2:g}em, {most}em, {of_window}vw)"

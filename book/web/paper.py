@@ -21,12 +21,15 @@ ROOT = Path(__file__).parents[2]
 LEFT_OUT = ("api",)
 STYLE = """
     html { font-size: 12px !important; }
-    body { background: white; }
+    body { background: white; line-height: 1.42; }
     button:not(th button), .headerlink, details.hide, .sorts, .toctree-wrapper,
     .tableofcontents-wrapper, .admonition-title::after { display: none !important; }
     article { max-width: 100% !important; padding: 0 !important; }
     article { break-before: page; }
-    article h1 { margin-top: 0; }
+    article h1 { margin: 0 0 0.6rem; font-size: 2.2em; }
+    article :is(h2, h3, h4) { margin: 1.2rem 0 0.5rem; line-height: 1.2; }
+    article :is(p, ul, ol, dl, .admonition, div[class*="highlight-"]) { margin-bottom: 0.6rem; }
+    article li > p { margin-bottom: 0.2rem; }
     .printed-contents ol { columns: 2; column-gap: 3em; list-style: none; padding: 0; }
     .printed-contents a { display: flex; gap: 0.3em; color: inherit; text-decoration: none; }
     .printed-contents a::before { content: ""; order: 1; flex: 1; margin: 0 0.5em;
@@ -34,20 +37,26 @@ STYLE = """
     .printed-contents .page { order: 2; }
     .printed-contents .title { break-after: avoid; font-weight: bold; margin-top: 0.6em; }
     .printed-contents .section { margin-left: 1.5em; }
-    .cell_output img, figure img { max-height: 68mm; max-width: 100%; width: auto !important;
+    .cell_output img, figure img { max-height: 62mm; max-width: 100%; width: auto !important;
       height: auto !important; margin: auto; display: block; }
-    .cell_output img[alt^="A picture from the film"] { max-height: 50mm; }
-    .thumbnails { grid-template-columns: 1fr 1fr !important; }
+    .cell_output img[alt^="A picture from the film"] { max-height: 45mm; }
+    .thumbnails { grid-template-columns: 1fr 1fr 1fr !important; gap: 0.5rem !important; }
+    .thumbnail img { max-height: 30mm; }
     .sd-row > * { flex: 0 0 50% !important; width: 50% !important; }
-    .sd-row img { max-height: 60mm; }
+    .sd-row img { max-height: 52mm; }
+    .bd-article .caption, figcaption { margin-bottom: 0.8rem !important; }
     h1, h2, h3, h4 { break-after: avoid; }
     p, li { orphans: 2; widows: 2; }
     figure, img, tr, .math, .thumbnail, .cell:has(img) { break-inside: avoid; }
-    .cell:has(img, video) { break-after: avoid; }
-    table { font-size: 0.8em !important; }
-    pre { white-space: pre-wrap !important; overflow-wrap: anywhere; }
+    .cell:has(img, video), .listing > p { break-after: avoid; }
+    .cell:not(:has(> :not(details.hide))) { display: none; }
+    .cell { margin: 0.4rem 0 !important; }
+    .cell pre { margin: 0; padding: 0.4rem 0.6rem; }
+    pre { line-height: 1.3; white-space: pre-wrap !important; overflow-wrap: anywhere; }
     div.cell_output, .output, table { overflow: visible !important; }
-    td, th { overflow-wrap: break-word; white-space: normal !important; padding: 0.2em 0.4em; }
+    .bd-article table { font-size: 0.78em !important; line-height: 1.25; margin: 0.3rem 0 0.7rem; }
+    .bd-article table :is(td, th) { padding: 0.12em 0.5em !important; overflow-wrap: break-word;
+      white-space: normal !important; }
     """
 
 # A film becomes the picture in its middle, with a word on where it moves; those of single seeds are
@@ -56,6 +65,11 @@ STILLS = """
     async () => {
       document.querySelectorAll('.play-films').forEach(it => it.remove());
       for (const film of document.querySelectorAll('video')) {
+        await new Promise(done => {
+          film.addEventListener('loadedmetadata', done, {once: true});
+          film.preload = 'auto';
+          film.load();
+        });
         await new Promise(done => {
           film.addEventListener('seeked', done, {once: true});
           film.currentTime = film.duration / 2;

@@ -1,5 +1,10 @@
-"""Of the theme's styles (450 kB, which hold up the first picture) only what some page can use."""
+"""Of the theme's styles (450 kB, which hold up the first picture) only what some page can use.
 
+In one file: a page waits for one answer, not for seventeen.
+"""
+
+import hashlib
+import os
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -8,6 +13,7 @@ import tinycss2
 from tinycss2.ast import Node
 
 NESTED = ("media", "supports", "layer", "container")
+LINK = r'\s*<link (?=[^>]*rel="stylesheet")[^>]*href="([^"?]+)[^>]*>'
 NAME = re.compile(r"[.#](-?[_a-zA-Z][\w-]*)")
 
 
@@ -72,3 +78,41 @@ def prune(site: Path) -> None:
     known = words(file.read_text(encoding="utf-8") for file in pages if "mathjax" not in file.parts)
     for sheet in sheets:
         sheet.write_text(pruned(sheet.read_text(encoding="utf-8"), known), encoding="utf-8")
+
+
+def packed(css: str) -> str:
+    """Leave out comments and the spaces that only people need.
+
+    Examples
+    --------
+    >>> packed("a  { /* of links */ content: ' /* */ ' }")
+    "a {  content: ' /* */ ' }"
+    """
+    parts = r"""("[^"]*"|'[^']*')|/\*.*?\*/|\s+"""
+    return re.sub(parts, lambda it: it[1] or " " * it[0].isspace(), css, flags=re.DOTALL)
+
+
+def _whole(sheet: Path) -> str:
+    """Return a style sheet with those that it imports in their place."""
+    text = sheet.read_text(encoding="utf-8").removeprefix('@charset "UTF-8";')
+    return re.sub(r'@import "([^"]+)";', lambda name: _whole(sheet.parent / name[1]), text)
+
+
+def join(site: Path, pages: Iterable[Path]) -> None:
+    """Put all style sheets of a built site into one, in their order, and let each page name it."""
+    texts = {page: page.read_text(encoding="utf-8") for page in pages}
+    sheets = dict.fromkeys(
+        (page.parent / name).resolve()
+        for page, text in texts.items()
+        for name in re.findall(LINK, text)
+    )
+    whole = packed("\n".join(map(_whole, sheets)))
+    for sheet in site.glob("_static/**/*.css"):
+        if "mathjax" not in sheet.parts:
+            sheet.unlink()
+    (site / "_static/book.css").write_text(whole, encoding="utf-8")
+    version = hashlib.sha256(whole.encode()).hexdigest()[:8]
+    for page, text in texts.items():
+        address = os.path.relpath(site / "_static/book.css", page.parent)
+        link = f'<link rel="stylesheet" href="{address}?v={version}" />'
+        page.write_text(re.sub(LINK, "", text).replace("</title>", f"</title>{link}", 1), "utf-8")

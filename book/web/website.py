@@ -1,8 +1,9 @@
 """A Sphinx extension: what all pages of the site have, or have not, beyond the settings.
 
-Pages are light: mathematics only where there are formulas, no script that holds up the first
-picture, of the theme's icon font and styles only what is used, every picture a file of its own with
-its size, so that nothing moves when it comes.
+Pages are light: what a page says is painted before any script or picture is asked for. One style
+sheet, with what is used of the theme's styles and icons; scripts and mathematics only where there
+is something for them to do, and afterwards (`_static/late.js`); every picture a file of its own
+with its size, so that nothing moves when it comes.
 """
 
 import base64
@@ -138,9 +139,55 @@ def set_apart(text: str, page: Path, images: Path) -> str:
         (images / name).write_bytes(data)
         return f'src="{os.path.relpath(images, page.parent)}/{name}"'
 
-    text = re.sub(r'(<div class="play-still"><img )', r'\1loading="lazy" ', text)
-    text = text.replace('preload="auto"', 'preload="metadata"')
+    text = text.replace('preload="auto"', 'preload="none"')
     return re.sub(r'src="data:(image/png|video/mp4);base64,([^"]+)"', moved, text)
+
+
+# What must be on a page so that a script has something to do there.
+NEEDED_BY = {
+    "/play/": "data-play=",
+    "/sort.js": "aria-sort|<th[^>]*><button",
+    "/design-tabs.js": "sd-tab-set",
+    "/togglebutton.js": r'class="[^"]*(?<![-\w])(toggle|admonition[^"]* dropdown)(?![-\w])',
+    "/copybutton.js": 'class="highlight"',
+    "/clipboard.min.js": 'class="highlight"',
+}
+THEME = 'localStorage.getItem("theme") || "auto"'
+
+
+def later(script: re.Match[str], text: str) -> str:
+    """Let a script wait for `late.js`, or leave it out of a page that has no use for it."""
+    needed = (mark for name, mark in NEEDED_BY.items() if name in script[0])
+    if not all(re.search(mark, text) for mark in needed):
+        return ""
+    attributes = re.sub(r'\s(defer|async)(="\w*")?', "", script[1])
+    return f'<script type="text/late"{attributes}></script>'
+
+
+def settled(text: str, page: Path) -> str:
+    """Settle before the first picture what the theme's scripts find out: settings, light or dark.
+
+    The settings are a file of few bytes that holds up the page; they are put into it.
+    """
+
+    def inside(script: re.Match[str]) -> str:
+        file = page.parent / script[1]
+        return (
+            f"<script>{file.read_text(encoding='utf-8')}</script>" if file.exists() else script[0]
+        )
+
+    dark = 'matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"'
+    mode = f'{{light: "light", dark: "dark"}}[localStorage.getItem("mode")] || ({dark})'
+    text = text.replace(THEME, mode)
+    return re.sub(r'<script src="([^"?]*documentation_options\.js)[^"]*"></script>', inside, text)
+
+
+def unnamed(text: str) -> str:
+    """Take from the cells of tables the addresses that no style names: half of a table's bytes."""
+    named = {name for style in re.findall("<style.*?</style>", text, re.DOTALL)
+             for name in re.findall(r"#([\w-]+)", style)}  # fmt: skip
+    cell = r'(<t[hd]) id="(T_[\w-]+_(?:row|level)\d[^"]*)"'
+    return re.sub(cell, lambda it: it[0] if it[2] in named else it[1], text)
 
 
 def lightened(text: str, page: Path) -> str:
@@ -154,20 +201,21 @@ def lightened(text: str, page: Path) -> str:
         Where it is: its pictures are found from there.
     """
     text = re.sub(r"\s*<(script|link)[^>]*/fontawesome/[^>]*>(</script>)?", "", text)
-    head, body = text.split("</head>", 1)
-    # In a head, a script waits for the page, but for the first, which inline ones build upon.
-    head = re.sub(
-        r"<script (?![^>]*\b(?:defer|async)\b)(?![^>]*documentation_options)([^>]*\bsrc=)",
-        r"<script defer \1",
-        head,
+    text = re.sub(r'\s*<link rel="preload" as="script"[^>]*>', "", text)
+    # Formulas are set when all else is there (`_static/late.js`), by the parts of MathJax that
+    # `_config.yml` lists: two thirds of the file with everything in it.
+    text = re.sub(
+        r'<script defer="defer" src="([^"]*mathjax/)tex-chtml.js[^"]*"></script>',
+        r'<meta name="mathjax" content="\1startup.js" />',
+        text,
     )
-    # Formulas are set when all else is there: `_static/late.js`.
-    head = re.sub(
-        r'<script defer="defer" src="([^"]*mathjax[^"]*)"></script>',
-        r'<meta name="mathjax" content="\1" />',
-        head,
-    )
+    text = settled(text, page)
+    scripts = r"<script((?![^>]*(?:/late\.js|documentation_options))[^>]*\ssrc=[^>]*)></script>"
+    text = re.sub(scripts, lambda script: later(script, text), text)
+    text = re.sub(r'<script (src="[^"]*/late\.js)', r"<script defer \1", text)
+    head, body = unnamed(text).split("</head>", 1)
     body = re.sub(r"<img((?:\s[^>]*)?>)", lambda tag: sized(tag, page), body)
+    body = re.sub(r"<img (?![^>]*\bloading=)", '<img loading="lazy" ', body)
     body = re.sub(r"<th(?:\s[^>]*)?>(?:\s|&nbsp;)*</th>", "<td></td>", body)
     # Read out is what can be read, not another name for it.
     body = re.sub(
@@ -190,6 +238,7 @@ def lighten(app: Sphinx, error: Exception | None) -> None:
     (site / "_static/icons.css").write_text(icons.style(site), encoding="utf-8")
     shutil.rmtree(site / "_static/vendor/fontawesome")
     styles.prune(site)
+    styles.join(site, pages)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

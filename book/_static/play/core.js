@@ -154,16 +154,18 @@ window.play = (() => {
     return points.length ? `M${points.join("L")}Z` : "";
   }
 
-  document.addEventListener("DOMContentLoaded", () => {
-    for (const host of document.querySelectorAll("[data-play]")) {
-      const build = widgets[host.dataset.play];
-      if (!build) continue;
+  const hosts = () => document.querySelectorAll("[data-play]:not(.play-on)");
+  function build(some = hosts()) {
+    for (const host of some) {
+      const kind = widgets[host.dataset.play];
+      if (!kind) continue;
       const live = el("div", { class: "play-live" });
       host.append(live);
-      build(live, JSON.parse(host.querySelector(":scope > script").textContent), host);
+      kind(live, JSON.parse(host.querySelector(":scope > script").textContent), host);
       host.classList.add("play-on");
     }
-  });
+  }
+  document.addEventListener("DOMContentLoaded", () => build()); // in the book `late.js` does it
 
-  return { widgets, el, svg, fixed, grouped, brief, doubles, floats, choice, slider, rove, chart, path, band };
+  return { hosts, build, widgets, el, svg, fixed, grouped, brief, doubles, floats, choice, slider, rove, chart, path, band };
 })();
