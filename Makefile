@@ -33,7 +33,7 @@ endif
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .PHONY: help setup announce book chapter lab zip pdf picture test lint types unit pairing notebooks browser hostile \
-	sync bench clean .venv/install
+	sync bench timing clean .venv/install .venv/jax
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -113,7 +113,13 @@ sync: setup ## write the .ipynb twins anew from the .py files
 bench: setup ## speed ratios against other libraries, measured now on this machine
 	@"$(PYTHON)" book/web/stamp.py .venv/.benchmarks --in environment.txt --in bench/environment.txt -- \
 		$(BIN)/python -m pip install --quiet --requirement environment.txt --requirement bench/environment.txt
+	@"$(PYTHON)" book/web/stamp.py .venv/.jax --in bench/jax.txt --also "$$("$(PYTHON)" --version)" -- $(MAKE) --no-print-directory .venv/jax
 	$(RUN) python -m bench
+
+# A rival whose libraries do not go with ours.
+.venv/jax:
+	@"$(BIN)/python" -m venv --clear $@
+	@$@/bin/python -m pip install --quiet --requirement bench/jax.txt
 
 clean: ## remove what was built and measured (keeps .venv)
 	rm -rf _build results

@@ -1,14 +1,14 @@
-"""REINFORCE against the usual loop and Stable-Baselines3: microseconds an environment step.
+"""REINFORCE against the usual loop, Stable-Baselines3 and networks stacked in torch.
+
+Measured in microseconds of processor time an environment step.
 
 All learn with the same hyperparameters. Rates are taken over the beginning of training, the first
 episodes of a seed up to a budget of steps, because the usual loop would take hours for the rest;
 what the whole of our training takes is told beside it.
 """
 
-import math
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from itertools import pairwise
 from unittest import mock
@@ -22,7 +22,8 @@ from torch import nn
 from torch.distributions import Categorical as TorchCategorical
 from torch.distributions import Normal
 
-from bench.table import comparison
+from bench import stacked
+from bench.table import comparison, in_turns, processor_seconds
 from rl_core import reinforce
 from rl_core.kernels import likelihood, networks
 from rl_core.policies import MLP, Categorical, Gaussian, initial_parameters, make_policy
@@ -31,8 +32,7 @@ from rl_core.reinforce import ReinforceConfig
 SEEDS = range(30)
 BEGINNING = {"episodes": 50, "max_env_steps": 40_000}  # of a seed
 WHOLE = 2_000  # episodes
-ROUNDS = 3
-UNIT = "microseconds a step"
+UNIT = "processor µs a step"
 CONFIGS = {
     "Acrobot-v1": ReinforceConfig(max_episode_steps=5_000, learn_from_capped=False),
     "MountainCar-v0": ReinforceConfig(max_episode_steps=100_000, learn_from_capped=False),
@@ -47,6 +47,8 @@ CONFIGS = {
     ),
 }
 BUDGET = 5_000_000  # environment steps a seed, for the whole training
+LOCKSTEP = ReinforceConfig(max_episode_steps=200)  # nearly no episode ends before
+LOCKSTEP_EPISODES = 30
 
 
 class UsualAgent:
@@ -157,10 +159,9 @@ def a2c(name: str, seed: int, steps: int = 20_000) -> int:
 
 
 def microseconds(way: Callable[[], int]) -> float:
-    """Wall time a step of one call."""
-    start = time.perf_counter()
-    steps = way()
-    return (time.perf_counter() - start) / steps * 1e6
+    """Processor time a step of one call."""
+    steps = []
+    return processor_seconds(lambda: steps.append(way())) / steps[0] * 1e6
 
 
 def where_time_goes(name: str) -> str:
@@ -194,23 +195,13 @@ def where_time_goes(name: str) -> str:
 
 
 def stacked_update(n_networks: int, n: int) -> Callable[[], int]:
-    """One minibatch of n for each of many networks in torch: baddbmm, autograd, fused Adam."""
-    widths = (6, 10, 20, 3)
-    shapes = list(pairwise(widths))
-    weights = [(torch.randn(n_networks, a, b) / math.sqrt(a)).requires_grad_() for a, b in shapes]
-    biases = [torch.zeros(n_networks, 1, b, requires_grad=True) for _, b in shapes]
-    optimiser = torch.optim.Adam([*weights, *biases], lr=1e-3, fused=True)
+    """One minibatch of n for each of many networks in torch."""
+    networks = stacked.Networks(n_networks, (6, 10, 20, 3), learning_rate=1e-3)
     states = torch.randn(n_networks, n, 6)
     actions, v = torch.randint(0, 3, (n_networks, n, 1)), torch.randn(n_networks, n)
 
     def update() -> int:
-        h = states
-        for layer, (weight, bias) in enumerate(zip(weights, biases, strict=True)):
-            h = torch.baddbmm(bias, h if layer == 0 else h.relu(), weight)
-        logs = torch.log_softmax(h, -1).gather(-1, actions).squeeze(-1)
-        optimiser.zero_grad()
-        (-(logs * v).sum() / n).backward()
-        optimiser.step()
+        stacked.learn(networks, states, actions, v)
         return n_networks * n
 
     return update
@@ -239,26 +230,14 @@ def compiled_update(n_networks: int, n: int) -> Callable[[], int]:
     return update
 
 
-@contextmanager
-def one_torch_thread() -> Iterator[None]:
-    """Torch with one thread, and as it was afterwards."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
-
-
-def best_of(ways: dict[str, Callable[[int], int]], rounds: int) -> dict[str, float]:
-    """Compile, then let the ways take turns; the fastest round of each counts."""
-    best = dict.fromkeys(ways, np.inf)
+def costs_of(ways: dict[str, Callable[[int], int]], name: str) -> dict[str, list[float]]:
+    """Compile, then let the ways take turns: the cost a step of each turn."""
     for way in ways.values():
         way(99)
-    for seed in range(rounds):
-        for name, way in ways.items():
-            best[name] = min(best[name], microseconds(lambda way=way, seed=seed: way(seed)))
-    return best
+    measured = {
+        key: lambda turn, way=way: microseconds(lambda: way(turn)) for key, way in ways.items()
+    }
+    return in_turns(measured, name)
 
 
 def training_rows() -> Iterator[dict]:
@@ -274,44 +253,68 @@ def training_rows() -> Iterator[dict]:
         }
         if name == "Acrobot-v1":
             ways["a2c"] = lambda seed, name=name: a2c(name, seed)
-        best = best_of(ways, ROUNDS)
+        benchmark = f"REINFORCE on {name}"
+        costs = costs_of(ways, benchmark)
         note = (
             f"rival: one network; ours: 30 seeds; {beginning}; {learned_share(name):.0%} of our "
             "steps are in finished episodes, learned from"
         )
         if name != "MountainCarContinuous-v0":
             note += f"; {where_time_goes(name)}"
-        benchmark = f"REINFORCE on {name}"
         usual = "usual loop over Gymnasium and torch"
-        yield comparison(benchmark, usual, best["usual"], best["ours"], UNIT, note)
+        yield comparison(benchmark, usual, costs["usual"], costs["ours"], UNIT, note)
         if name == "Acrobot-v1":
             note = f"rival: 16 environments, 20,000 steps; ours: 30 seeds; {beginning}"
             yield comparison(
-                benchmark, "Stable-Baselines3 A2C", best["a2c"], best["ours"], UNIT, note
+                benchmark, "Stable-Baselines3 A2C", costs["a2c"], costs["ours"], UNIT, note
             )
+
+
+def stacked_row() -> dict:
+    """Whole training in lockstep: 30 seeds as one stack of networks and one of cars."""
+    episodes, steps = LOCKSTEP_EPISODES, LOCKSTEP.max_episode_steps
+
+    def theirs(seed: int) -> int:
+        return stacked.train_reinforce(len(SEEDS), LOCKSTEP, episodes, seed)
+
+    def mine(_: int) -> int:
+        table = reinforce.reinforce("MountainCar-v0", LOCKSTEP, episodes=episodes, seeds=SEEDS)
+        return int(table.table["steps"].sum())
+
+    name = f"REINFORCE on MountainCar-v0, episodes of {steps} steps"
+    costs = costs_of({"torch": theirs, "ours": mine}, name)
+    note = (
+        "both: 30 seeds, learning included, one core; rival: one stack of 30 networks and 30 cars "
+        "in lockstep, baddbmm, autograd, fused Adam"
+    )
+    return comparison(name, stacked.NAME, costs["torch"], costs["ours"], UNIT, note)
 
 
 def learner_rows() -> Iterator[dict]:
     """The learner alone: why the networks are compiled and not stacked in torch."""
     for n_networks, n in ((1, 150), (30, 150), (30, 512)):
         updates = {"torch": stacked_update(n_networks, n), "ours": compiled_update(n_networks, n)}
-        ways = {name: lambda _, update=update: update() for name, update in updates.items()}
-        best = best_of(ways, 100)
+        ways = {
+            name: lambda _, update=update: sum(update() for _ in range(100))
+            for name, update in updates.items()
+        }
         stack = "1 network" if n_networks == 1 else f"{n_networks} networks"
+        benchmark = f"one update of {stack}, minibatch {n}"
+        costs = costs_of(ways, benchmark)
         yield comparison(
-            f"one update of {stack}, minibatch {n}",
-            "torch, stacked networks",
-            best["torch"],
-            best["ours"],
-            "microseconds a sample",
-            "torch: baddbmm, autograd, fused Adam, one thread; widths 6-10-20-3",
+            benchmark,
+            stacked.NAME,
+            costs["torch"],
+            costs["ours"],
+            "processor µs a sample",
+            "baddbmm, autograd, fused Adam, one thread; widths 6-10-20-3; 100 updates a turn",
         )
 
 
 def rows() -> list[dict]:
     """Measure everything."""
-    with one_torch_thread():
-        return [*training_rows(), *learner_rows()]
+    torch.set_num_threads(1)
+    return [*training_rows(), stacked_row(), *learner_rows()]
 
 
 if __name__ == "__main__":
