@@ -146,10 +146,6 @@ def settings(config: Any) -> dict[str, Any]:
     return {field.name: getattr(config, field.name) for field in fields(config) if field.init}
 
 
-def table() -> pd.DataFrame:
-    return pd.DataFrame({"seed": [0, 0], "episode": [1, 2], "steps": [9.0, 7.0]})
-
-
 SAVED = "saved.npz"  # an agent, where `main` makes the calls
 SHORT = {"episodes": 1, "seeds": [0], "snapshots": (), "progress": None}
 WEIGHTS = {"layer0.weight": np.zeros((2, 3), np.float32)}
@@ -248,15 +244,8 @@ CALLS: dict[str, Callable[[], dict[str, Any]]] = {
     "reinforce.reinforce": lambda: {"env": "MountainCar-v0", "config": LINEAR, **SHORT},
     "statistics.bootstrap_interval": lambda: {"values": [1.0, 2.0], "statistic": np.median,
                                               "rng": rng(), **DRAWN},
-    "statistics.episodes_to_threshold": lambda: {"curves": np.ones((2, 3)), "threshold": 1.0,
-                                                 "hold": 2},
     "statistics.iqm": lambda: {"values": [1.0, 2.0, 3.0], "axis": 0},
     "statistics.learned": lambda: {"curves": np.ones((2, 3)), "threshold": 1.0, "window": 2},
-    "statistics.learning_curves": lambda: {"table": table(), "column": "steps", "seeds": [0],
-                                           "episodes": 2, "window": 1, "average": "median"},
-    "statistics.paired_difference_interval": lambda: {"a": [1.0, 2.0], "b": [1.0, 3.0],
-                                                      "statistic": np.median, "rng": rng(),
-                                                      **DRAWN},
     "statistics.probability_of_improvement": lambda: {"a": [1.0, 2.0], "b": [1.0, 3.0],
                                                       "rng": rng(), **DRAWN},
     "statistics.proportion_interval": lambda: {"successes": 1, "trials": 3, "level": 0.9},
