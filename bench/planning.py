@@ -112,7 +112,7 @@ def _memory_row() -> dict:
 def _compile_seconds() -> float:
     """Seconds the first call takes in a copy of the sources, where nothing was compiled before."""
     with tempfile.TemporaryDirectory() as folder:
-        for package in ("rl_core", "bench"):
+        for package in ("rl_core", "bench", "book/studies"):
             shutil.copytree(
                 ROOT / package, Path(folder, package), ignore=shutil.ignore_patterns("__pycache__")
             )
@@ -232,7 +232,8 @@ def compile_once(side: int, flags: int) -> dict[str, float]:
 
 
 def _maze(side: int, flags: int) -> Any:
-    from rl_core.maze import random_maze
+    sys.path.append(str(ROOT / "book"))
+    from studies.random_mazes import random_maze
 
     return random_maze(side, side, flags, WALL_FRACTION, np.random.default_rng(SEED)).model()
 

@@ -13,7 +13,7 @@ from scipy.optimize import linprog
 from rl_core import planning
 from rl_core.kernels import bounds, sweeps
 from rl_core.kernels.bounds import error_bound
-from rl_core.maze import Maze, random_maze
+from rl_core.maze import Maze
 from rl_core.mdp import MDP
 from rl_core.planning import (
     backup,
@@ -24,6 +24,7 @@ from rl_core.planning import (
     q_value_iteration,
     value_iteration,
 )
+from studies.random_mazes import random_maze
 
 PLANNERS = {
     "q_value_iteration": lambda mdp, gamma: q_value_iteration(mdp, gamma=gamma, threshold=1e-10),
