@@ -210,7 +210,16 @@ def memory(side: int, flags: int) -> dict[str, float]:
     Path("/proc/self/clear_refs").write_text("5")  # the peak counts from here
     value_iteration(model, gamma=GAMMA, tolerance=TOLERANCE, progress=False)
     peak = _status("VmHWM") - before
-    return {"peak": peak / model.n_states, "model": model.nbytes / model.n_states}
+    return {"peak": peak / model.n_states, "model": held_bytes(model) / model.n_states}
+
+
+def held_bytes(model: Any) -> int:
+    """Memory the arrays of a model take; what a broadcast view repeats is counted once."""
+    total = 0
+    for array in vars(model).values():
+        held = [n for n, stride in zip(array.shape, array.strides, strict=True) if stride]
+        total += array.itemsize * int(np.prod(held))
+    return total
 
 
 def _status(field: str) -> int:
