@@ -118,10 +118,6 @@ def maze() -> Maze:
     return made
 
 
-def world() -> discretise.GriddedTask:
-    return discretise.gridded("MountainCar-v0", 3)
-
-
 def cut() -> discretise.Discretised:
     made = discretise.Discretised("MountainCar-v0", 3)
     made.reset(seed=0)
@@ -172,12 +168,10 @@ CALLS: dict[str, Callable[[], dict[str, Any]]] = {
                                       "env": None, "rng": None},
     "evaluation.check_fit": lambda: {"agent": uniform(2, 3), "world": open_world("MountainCar-v0")},
     "evaluation.evaluate": lambda: {"env": "MountainCar-v0", "agent": uniform(2, 3), "seed": 0,
-                                    "episodes": 1, "max_steps": 9, "limit": 5, "measures": None},
+                                    "episodes": 1, "max_steps": 9, "measures": None},
     "evaluation.evaluation_streams": lambda: {"seed": 0},
     "evaluation.greedy": lambda: {"agent": uniform(2, 3)},
     "evaluation.load": lambda: {"path": SAVED, "rng": None},
-    "evaluation.of_table": lambda: {"world": world(), "Q": np.zeros((9, 3)), "epsilon": 0.1},
-    "evaluation.of_values": lambda: {"weights": WEIGHTS, "epsilon": 0.1},
     "evaluation.rollout": lambda: {"env": "MountainCar-v0", "agent": uniform(2, 3), "rng": rng(),
                                    "max_steps": 9},
     "evaluation.spaces_of": lambda: {"env": "MountainCar-v0"},
