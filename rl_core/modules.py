@@ -5,8 +5,8 @@ algorithms: the same seed gives the same bits.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from copy import deepcopy
 from itertools import pairwise
 from typing import Any
@@ -20,6 +20,8 @@ from rl_core.identity import imported
 from rl_core.kernels import networks
 from rl_core.kernels.arrays import F32, Arrays
 from rl_core.policies import MLP, Network
+from rl_core.training import Run, Training, train_seeds
+from rl_core.worlds.environments import EnvironmentLike, World, one_seed_of, open_world
 
 
 def perceptron(sizes: Sequence[int], parameters: F32, biases: bool = True) -> torch.nn.Sequential:
@@ -152,6 +154,35 @@ def reproducible(seed: int = 0) -> Iterator[None]:
     finally:
         torch.set_num_threads(threads)
         torch.set_deterministic_debug_mode(mode)
+
+
+def train_networks(
+    train: Callable[[World, Any, Training], None],
+    env: EnvironmentLike,
+    config: object,
+    *,
+    seeds: Iterable[int],
+    **arguments: Any,
+) -> Run:
+    """Train a network a seed, each in a world of its own, with torch made `reproducible`.
+
+    Parameters
+    ----------
+    train : callable
+        Trains a seed: `train(world, config, training)`.
+    env, config : object
+    seeds : iterable of int
+        Several only if a world can be opened for each.
+    **arguments : object
+        Episodes, snapshots and progress, see `rl_core.training.train_seeds`.
+    """
+
+    def train_one(training: Training) -> None:
+        with closing(open_world(env)) as world, reproducible(training.seed):
+            train(world, config, training)
+
+    seeds = one_seed_of(env, seeds)
+    return train_seeds(train_one, seeds=seeds, env=env, config=config, **arguments)
 
 
 def as_arrays(module: torch.nn.Module) -> Arrays:

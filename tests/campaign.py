@@ -129,8 +129,8 @@ def learn(*_: Any, **__: Any) -> Any:
 
 
 def train(training: Training) -> None:
-    training.add(1, 1.0, True)
-    training.keep("", {"a": np.zeros(1)})
+    for _ in training.course(None, lambda: {"a": np.zeros(1)}):
+        training.add(1, 1.0, True)
 
 
 def agent() -> Agent:
@@ -227,10 +227,8 @@ CALLS: dict[str, Callable[[], dict[str, Any]]] = {
     "policies.check_network": lambda: {"network": MLP(), "engine": None},
     "q_learning.QLearningConfig": lambda: settings(TABULAR),
     "q_learning.check_q_learning": lambda: {"env": lake(), "config": TABULAR},
-    "q_learning.check_q_learning_on_model": lambda: {"env": "FrozenLake-v1", "config": TABULAR},
     "q_learning.q_learning": lambda: {"env": lake(), "config": TABULAR,
                                       "Q_star": np.zeros((16, 4)), **SHORT},
-    "q_learning.q_learning_on_model": lambda: {"env": "FrozenLake-v1", "config": TABULAR, **SHORT},
     "reinforce.ReinforceConfig": lambda: settings(LINEAR),
     "reinforce.check_reinforce": lambda: {"env": "MountainCar-v0", "config": LINEAR},
     "reinforce.reinforce": lambda: {"env": "MountainCar-v0", "config": LINEAR, **SHORT},
@@ -293,6 +291,7 @@ INSIDE = {
     "modules.as_arrays": "of what make_module returns",
     "modules.make_module": "inside the learners, of a config and a world that were checked",
     "modules.perceptron": "inside make_module",
+    "modules.train_networks": "inside the learners; what it is told is checked by train_seeds",
     "modules.reproducible": "around training; its seed is a seed that was checked",
     "planning.Plan": "returned",
     "policies.initial_parameters": "of what make_policy returns",

@@ -33,11 +33,10 @@ from rl_core.planning import optimal_actions, value_iteration
 from rl_core.q_learning import (
     QLearningConfig,
     check_q_learning,
-    check_q_learning_on_model,
     q_learning,
-    q_learning_on_model,
 )
 from rl_core.worlds.tabular import spawn_draws
+from studies.on_model import check_q_learning_on_model, q_learning_on_model
 
 MEASURED = ("error_norm", "rmse", "rmse_visitable", "optimal_states", "value_lost")
 
