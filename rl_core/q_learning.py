@@ -33,7 +33,7 @@ from numba.extending import register_jitable
 from numpy.typing import ArrayLike
 
 from rl_core import checks, exploration
-from rl_core.exploration import EpsilonGreedy, ExplorationRule, Schedule, Trials, VisitDecay
+from rl_core.exploration import EpsilonGreedy, ExplorationRule, Linear, Trials, VisitDecay
 from rl_core.kernels import appraisal
 from rl_core.kernels.appraisal import Appraisal, Yardstick
 from rl_core.kernels.arrays import F64, I64, Arrays
@@ -59,7 +59,7 @@ class QLearningConfig:
     ----------
     gamma : float
         Discount, in [0, 1].
-    step_size : float or Schedule or VisitDecay
+    step_size : float or Linear or VisitDecay
         alpha, in (0, 1].
     exploration : EpsilonGreedy or Softmax or UnnormalisedSoftmax
         How actions are chosen while learning.
@@ -89,7 +89,7 @@ class QLearningConfig:
     """
 
     gamma: float = 0.9
-    step_size: float | Schedule | VisitDecay = 0.2
+    step_size: float | Linear | VisitDecay = 0.2
     exploration: ExplorationRule = field(default_factory=EpsilonGreedy)
     max_steps: int | None = None
     max_env_steps: int | None = 10_000_000

@@ -36,7 +36,7 @@ from rl_core.checks import number
 from rl_core.dqn import DQNConfig
 from rl_core.evaluation import Agent, as_learned, spaces_of, uniform
 from rl_core.experiments import Arm
-from rl_core.exploration import Geometric, Linear, Trials
+from rl_core.exploration import Linear, Trials
 from rl_core.maze import Maze
 from rl_core.mdp import MDP
 from rl_core.policies import MLP, Categorical, Gaussian
@@ -183,8 +183,6 @@ CALLS: dict[str, Callable[[], dict[str, Any]]] = {
                                        "seeds": [0], "store": "store",
                                        "workers": 1, "backend": "loky", "progress": False},
     "exploration.EpsilonGreedy": lambda: {"epsilon": 0.1},
-    "exploration.Geometric": lambda: {"start": 1.0, "end": 0.1, "episodes": 3},
-    "exploration.Geometric.values": lambda: {"self": Geometric(1.0, 0.1, 3), "episodes": 3},
     "exploration.HalfWay": lambda: {"start": 0.9, "end": 0.1},
     "exploration.Linear": lambda: {"start": 1.0, "end": 0.1, "episodes": 3, "steps": None},
     "exploration.Linear.values": lambda: {"self": Linear(1.0, 0.1, 3), "episodes": 3},

@@ -17,7 +17,6 @@ from toy_task import Corridor
 from rl_core.evaluation import evaluate, greedy
 from rl_core.exploration import (
     EpsilonGreedy,
-    Geometric,
     HalfWay,
     Linear,
     Softmax,
@@ -172,7 +171,7 @@ def test_it_is_the_textbook_program(Q_star):
     ("exploration", "step_size"),
     [
         (EpsilonGreedy(0.5), 0.2),
-        (Softmax(Geometric(2.0, 0.1, episodes=10)), VisitDecay(Linear(0.9, 0.5, episodes=5), 0.7)),
+        (Softmax(Linear(2.0, 0.1, episodes=10)), VisitDecay(Linear(0.9, 0.5, episodes=5), 0.7)),
     ],
 )
 def test_the_compiled_path_and_the_plain_loop_agree_bit_for_bit(
@@ -636,7 +635,7 @@ def test_a_return_that_is_not_finite_stops_that_seed_only():
         ({"step_size": 1.01}, ValueError, "step_size must .*, got 1.01"),
         ({"step_size": np.nan}, ValueError, "step_size must .*, got nan"),
         ({"step_size": Linear(0.5, 0.0, episodes=9)}, ValueError, "step_size.end must .*, got 0.0"),
-        ({"step_size": Linear(0.5, 0.1, steps=9)}, ValueError, "step_size must .* by the episode"),
+        ({"step_size": Linear(0.5, 0.1, steps=9)}, ValueError, "step_size must .* in episodes"),
         ({"step_size": HalfWay()}, TypeError, "step_size must .*, got HalfWay"),
         ({"step_size": "fast"}, TypeError, "step_size must .*, got 'fast'"),
         ({"gamma": 1.5}, ValueError, "gamma must be a number from 0 to 1, got 1.5"),
