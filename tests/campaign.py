@@ -216,7 +216,7 @@ CALLS: dict[str, Callable[[], dict[str, Any]]] = {
                                           "evaluation_threshold": 0.1,
                                           "initial_policy": np.zeros(16, int)},
     "planning.q_value_iteration": lambda: {"mdp": lake(), "gamma": 0.9, "threshold": 0.1,
-                                           "max_sweeps": 3, "progress": False},
+                                           "progress": False},
     "planning.value_iteration": lambda: {"mdp": lake(), "gamma": 0.9, "tolerance": 0.1,
                                          "progress": False},
     "policies.Gaussian": lambda: settings(Gaussian()),
