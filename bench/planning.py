@@ -134,7 +134,7 @@ def _say(text: str) -> None:
 def _compile_seconds() -> float:
     """Seconds the first call takes in a copy of the sources, where nothing was compiled before."""
     with tempfile.TemporaryDirectory() as folder:
-        for package in ("rl_core", "bench"):
+        for package in ("rl_core", "bench", "book/studies"):
             shutil.copytree(
                 ROOT / package, Path(folder, package), ignore=shutil.ignore_patterns("__pycache__")
             )
@@ -305,10 +305,19 @@ def memory(side: int, flags: int) -> dict[str, float]:
     seconds, peak, states = processor_seconds(solve), _status("VmHWM"), model.n_states
     return {
         "peak": (peak - before) / states,
-        "model": model.nbytes / states,
+        "model": held_bytes(model) / states,
         "process": max(process, peak),
         "seconds": seconds,
     }
+
+
+def held_bytes(model: Any) -> int:
+    """Memory the arrays of a model take; what a broadcast view repeats is counted once."""
+    total = 0
+    for array in vars(model).values():
+        held = [n for n, stride in zip(array.shape, array.strides, strict=True) if stride]
+        total += array.itemsize * int(np.prod(held))
+    return total
 
 
 def _status(field: str) -> int:
@@ -330,7 +339,8 @@ def compile_once(side: int, flags: int) -> dict[str, float]:
 
 
 def _maze(side: int, flags: int) -> Any:
-    from rl_core.maze import random_maze
+    sys.path.append(str(ROOT / "book"))
+    from studies.random_mazes import random_maze
 
     return random_maze(side, side, flags, WALL_FRACTION, np.random.default_rng(SEED)).model()
 

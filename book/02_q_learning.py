@@ -695,7 +695,8 @@ captioned(
 
 # %% tags=["hide-cell"]
 from rl_core.exploration import EpsilonGreedy
-from rl_core.q_learning import QLearningConfig, q_learning_on_model
+from rl_core.q_learning import QLearningConfig
+from studies.on_model import q_learning_on_model
 
 {
     step_size: q_learning_on_model(
@@ -717,7 +718,8 @@ from rl_core.q_learning import QLearningConfig, q_learning_on_model
 # %% tags=["hide-cell"]
 from rl_core.evaluation import evaluate, greedy
 from rl_core.exploration import EpsilonGreedy
-from rl_core.q_learning import QLearningConfig, q_learning_on_model
+from rl_core.q_learning import QLearningConfig
+from studies.on_model import q_learning_on_model
 
 config = QLearningConfig(gamma=0.99, step_size=0.1, exploration=EpsilonGreedy(0.5))
 lake = q_learning_on_model("FrozenLake-v1", config, episodes=5_000, seeds=[0])

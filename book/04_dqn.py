@@ -40,14 +40,15 @@ from report.figure_data import offer, tidy
 from report.listings import listing
 from report.seeds import premise
 from rl_core.dqn import DQNConfig, dqn
-from rl_core.evaluation import of_values, rollout
+from rl_core.evaluation import rollout
 from rl_core.experiments import Arm, run
 from rl_core.policies import MLP
-from rl_core.statistics import learning_curves
 from rl_core.training import weights_of
 from rl_core.worlds.shaping import Shaping
 from studies import dqn as study
 from studies import dqn_again as again
+from studies.curves import learning_curves
+from studies.shared import of_values
 
 look.use_style()
 RESULTS = Path("../results")

@@ -112,15 +112,9 @@ def number(
 
 def _range(low: float, high: float, above: float, below: float) -> str:
     """Say in words which numbers are meant."""
-    parts = []
-    if math.isfinite(low):
-        parts.append(f"from {low:g}")
-    if math.isfinite(above):
-        parts.append(f"above {above:g}")
-    if math.isfinite(high):
-        parts.append(f"to {high:g}" if math.isfinite(low) else f"up to {high:g}")
-    if math.isfinite(below):
-        parts.append(f"below {below:g}")
+    to = "to" if math.isfinite(low) else "up to"
+    bounds = {"from": low, "above": above, to: high, "below": below}
+    parts = [f"{word} {bound:g}" for word, bound in bounds.items() if math.isfinite(bound)]
     bounded = math.isfinite(max(low, above)) and math.isfinite(min(high, below))
     return " ".join(["a number" if bounded else "a finite number", *parts])
 
@@ -237,9 +231,8 @@ def floats(
     Traceback (most recent call last):
     ValueError: V must be finite, at (1,) it is nan
     """
-    wanted = (
-        f"an array of numbers of shape ({', '.join('any' if n is None else str(n) for n in shape)})"
-    )
+    lengths = ", ".join("any" if n is None else str(n) for n in shape)
+    wanted = f"an array of numbers of shape ({lengths})"
     try:
         given = np.asarray(values)
     except (RuntimeError, TypeError, ValueError):  # ragged nesting, or what its own code raises
@@ -258,11 +251,9 @@ def floats(
     except (TypeError, ValueError):
         _refuse(TypeError, name, given, wanted)
     wrong = ~np.isfinite(array) if finite else np.isnan(array)
-    if wrong.any():
-        at = tuple(int(i[0]) for i in np.nonzero(wrong))
-        raise ValueError(
-            f"{name} must be {'finite' if finite else 'without NaN'}, at {at} it is {array[at]}"
-        )
+    for index in np.argwhere(wrong)[:1].tolist():
+        at, allowed = tuple(index), "finite" if finite else "without NaN"
+        raise ValueError(f"{name} must be {allowed}, at {at} it is {array[at]}")
     return array
 
 
@@ -281,10 +272,8 @@ def in_memory(name: str, value: object, room: int) -> None:
     except (AttributeError, OSError, ValueError):  # it does not tell
         return
     if room > has:
-        allowed = (
-            f"less: it would take {room / 2**30:,.1f} GiB of memory, and this machine has "
-            f"{has / 2**30:,.1f}"
-        )
+        asked, there = (f"{size / 2**30:,.1f}" for size in (room, has))
+        allowed = f"less: it would take {asked} GiB of memory, and this machine has {there}"
         _refuse(ValueError, name, value, allowed)
 
 
@@ -317,6 +306,5 @@ def fields(config: object, **rules: tuple[Any, ...]) -> None:
 
 def _refuse(kind: type[Exception], name: str, value: object, allowed: str) -> NoReturn:
     shown = repr(value)
-    if len(shown) > 200:
-        shown = f"{shown[:200]}..."
+    shown = shown if len(shown) <= 200 else f"{shown[:200]}..."
     raise kind(f"{name} must be {allowed}, got {shown}")

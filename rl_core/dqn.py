@@ -38,8 +38,7 @@ from rl_core.kernels.compiled import compiled
 from rl_core.kernels.q_update import ACTION, COPIES, KEPT, STEPS, UPDATES, Learner, Settings
 from rl_core.kernels.replay import Memory, sample, store
 from rl_core.policies import MLP, Network, check_network
-from rl_core.training import Progress, Run, Training, spawn_streams, train_seeds
-from rl_core.worlds import environments
+from rl_core.training import Progress, Run, Training, spawn_streams
 from rl_core.worlds.environments import EnvironmentLike, TaskWorld, World, open_world, step
 from rl_core.worlds.shaping import Shaping, shape_for, shaped_reward
 
@@ -306,13 +305,12 @@ def _train(world: World, config: DQNConfig, training: Training) -> None:
     streams = spawn_streams(training.seed)
     world.seed(streams.environment_seed)
     learner, arrays = _make_learner(config, world, streams.network)
-    training.keep("initial/", arrays())
     memory = replay.make_memory(config.memory_size, world.n_observations, as_bytes=world.as_bytes)
     shape = shape_for(config.shaping, world.n_observations)
     rngs = streams.policy, streams.replay
     both = isinstance(world, TaskWorld) and isinstance(learner, Learner)
     play_episode = _play_compiled if both else play
-    for episode in training.course(config.max_env_steps):
+    for episode in training.course(config.max_env_steps, arrays):
         max_steps = training.max_steps(config.max_episode_steps, world.max_episode_steps)
         first = world.reset()
         steps, total, terminated, outcome = play_episode(
@@ -324,11 +322,8 @@ def _train(world: World, config: DQNConfig, training: Training) -> None:
                 f"{steps} of episode {episode}, seed {training.seed}"
             )
         training.add(steps, total, terminated)
-        if outcome == DIVERGED or not all(np.isfinite(array).all() for array in arrays().values()):
-            training.fail("the loss or a weight is not finite")
-        if training.wants(episode):
-            training.keep(f"episode{episode}/", arrays())
-    training.keep("", arrays())
+        if outcome == DIVERGED:
+            training.fail("the loss is not finite")
 
 
 def check_dqn(env: EnvironmentLike, config: DQNConfig) -> None:
@@ -390,11 +385,5 @@ def dqn(
     ([200, 200, 200, 200], (2, 2, 64))
     """
     instance("config", config, DQNConfig, "a DQNConfig")
-
-    def train(training: Training) -> None:
-        with closing(open_world(env)) as world, modules.reproducible(training.seed):
-            _train(world, config, training)
-
-    seeds = environments.one_seed_of(env, seeds)
-    told: Any = {"progress": progress, "env": env, "config": config}
-    return train_seeds(train, episodes=episodes, seeds=seeds, snapshots=snapshots, **told)
+    told: Any = {"episodes": episodes, "snapshots": snapshots, "progress": progress}
+    return modules.train_networks(_train, env, config, seeds=seeds, **told)

@@ -13,11 +13,10 @@ one that acts at random: its preferences are equal. A table of action values is 
 import io
 import json
 import math
-from collections.abc import Callable, Mapping
-from contextlib import closing
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +28,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from rl_core import modules
-from rl_core.checks import floats, generator, instance, integer, number, require, truth
+from rl_core.checks import floats, generator, instance, integer, require, truth
 from rl_core.dqn import DQNConfig
 from rl_core.identity import canonical_json, describe, restored
 from rl_core.kernels import likelihood, networks
@@ -38,30 +37,10 @@ from rl_core.mdp import MDP
 from rl_core.policies import MLP, Categorical, Gaussian, make_policy
 from rl_core.q_learning import QLearningConfig
 from rl_core.reinforce import ReinforceConfig
-from rl_core.worlds.discretise import (
-    Grid,
-    GriddedTask,
-    action_levels,
-    make_grid,
-    task_of,
-)
-from rl_core.worlds.environments import (
-    BYTE,
-    EnvironmentLike,
-    GymnasiumWorld,
-    World,
-    open_world,
-    opened,
-)
-from rl_core.worlds.episodes import (
-    AnyActor,
-    ModuleActor,
-    TableActor,
-    Trajectory,
-    act,
-    play_episode,
-    with_own_scratch,
-)
+from rl_core.worlds import environments, episodes
+from rl_core.worlds.discretise import Grid, action_levels, make_grid, task_of
+from rl_core.worlds.environments import EnvironmentLike, GymnasiumWorld, World
+from rl_core.worlds.episodes import AnyActor, ModuleActor, TableActor, Trajectory, play_episode
 from rl_core.worlds.names import Make, find
 from rl_core.worlds.twins import twin
 
@@ -71,10 +50,7 @@ SPAWN_KEY = (1_000,)
 COLD = np.float32(2.0**40)
 """1 / T of a greedy policy. A power of two, so that it rounds nothing."""
 
-COLUMNS = (
-    *("episode", "steps", "return", "terminated"),
-    *("limited_steps", "limited_return", "limited_terminated"),
-)
+COLUMNS = ("episode", "steps", "return", "terminated")
 """The columns of a table of evaluation, besides the measures."""
 
 Weights = Mapping[str, NDArray[np.float32]]
@@ -155,14 +131,17 @@ class Agent:
         Examples
         --------
         >>> import numpy as np
-        >>> from rl_core.evaluation import of_values
-        >>> agent = of_values({"layer0.weight": np.array([[1, 2]], np.float32)})
+        >>> from rl_core.dqn import DQNConfig
+        >>> from rl_core.evaluation import as_learned
+        >>> weights = {"layer0.weight": np.array([[1, 2]], np.float32)}
+        >>> agent = as_learned(DQNConfig(epsilon=0), weights)
         >>> agent.predict(np.ones(1)), agent.predict(np.ones((2, 1)))[0]
         ((np.int64(1), None), array([1, 1]))
         """
         chosen = self._greedy if truth("deterministic", deterministic) else self.actor
-        actor = with_own_scratch(chosen)
-        policy, n_seen = actor.policy, _observed(actor)
+        actor = episodes.with_own_scratch(chosen)
+        policy = actor.policy
+        n_seen = int(policy.sizes[0]) - policy.constant_feature
         shape = (n_seen,) if self.spaces is None else self.spaces[0].shape
         try:
             seen = np.asarray(observation)
@@ -173,12 +152,12 @@ class Agent:
         require(fits, "observation", f"{seen.dtype} of shape {seen.shape}", allowed)
         first = seen.reshape(-1, n_seen).astype(np.float32)
         if (seen if self.spaces is None else self.spaces[0]).dtype == np.uint8:
-            first *= BYTE
+            first *= environments.BYTE
         actions = np.empty((len(first), policy.action_width), np.float32)
         draw = self.rng.standard_normal if policy.gaussian else self.rng.random
         for one, action in zip(first, actions, strict=True):
             actor.noise[:] = draw(actor.noise.size)
-            act(actor, one, actor.noise, action)
+            episodes.act(actor, one, actor.noise, action)
         native = _native(actions, policy, self.spaces)
         return (native[0] if seen.shape == shape else native), state
 
@@ -196,15 +175,16 @@ class Agent:
         require(self.config is not None and self.spaces, "agent", self, "one of a run, to be saved")
         assert self.spaces is not None
         env = self.env if isinstance(self.env, str | Make) else None
-        about: dict[str, Any] = {"format": FORMAT, "config": describe(self.config)}
-        about |= {"env": describe(env, "env"), "spaces": []}
         arrays: dict[str, Any] = {f"weights {name}": array for name, array in self.weights.items()}
-        for space in self.spaces:
+        told: list[dict[str, Any]] = []
+        for i, space in enumerate(self.spaces):
             if isinstance(space, spaces.Discrete):
-                about["spaces"].append({"n": int(space.n), "start": int(space.start)})
-            else:
-                about["spaces"].append({"dtype": str(space.dtype)})
-                arrays |= {f"{len(about['spaces'])} {end}": getattr(space, end) for end in ENDS}
+                told.append({"n": int(space.n), "start": int(space.start)})
+            elif isinstance(space, spaces.Box):
+                told.append({"dtype": str(space.dtype)})
+                arrays |= {f"{i} low": space.low, f"{i} high": space.high}
+        about = {"format": FORMAT, "config": describe(self.config), "env": describe(env, "env")}
+        about["spaces"] = told
         buffer = io.BytesIO()
         np.savez_compressed(buffer, about=np.array(canonical_json(about)), **arrays)
         Path(path).write_bytes(buffer.getvalue())
@@ -270,9 +250,6 @@ class Agent:
         return Path(path)
 
 
-ENDS = ("low", "high")
-
-
 def load(path: str | Path, rng: np.random.Generator | None = None) -> Agent:
     """Return the agent that `Agent.save` wrote to a file.
 
@@ -308,17 +285,16 @@ def load(path: str | Path, rng: np.random.Generator | None = None) -> Agent:
             arrays = dict(file)
         about = json.loads(str(arrays["about"]))
         require(about["format"] == FORMAT, "format", about["format"], FORMAT)
-        found: list[spaces.Space[Any]] = []
-        for number_, space in enumerate(about["spaces"], 1):
-            if "n" in space:
-                found.append(spaces.Discrete(space["n"], start=space["start"]))
-            else:
-                bounds = (arrays[f"{number_} {end}"] for end in ENDS)
-                found.append(spaces.Box(*bounds, dtype=np.dtype(space["dtype"]).type))
+        seen, done = (
+            spaces.Discrete(told["n"], start=told["start"])
+            if "n" in told
+            else spaces.Box(arrays[f"{i} low"], arrays[f"{i} high"], dtype=told["dtype"])
+            for i, told in enumerate(about["spaces"])
+        )
         config, env = restored(about["config"]), restored(about["env"])
-        kept = [name for name in arrays if name.startswith("weights ")]
-        weights = {name.partition(" ")[2]: arrays[name] for name in kept}
-        agent = as_learned(config, weights, spaces=(found[0], found[1]), env=env)
+        kept = (name.partition("weights ") for name in arrays)
+        weights = {name: arrays[start + name] for _, start, name in kept if start}
+        agent = as_learned(config, weights, spaces=(seen, done), env=env)
     except Exception as error:  # whatever a damaged file makes of zipfile, numpy and json
         raise ValueError(
             f"path must be a file that Agent.save wrote, got {str(path)!r}: {error}"
@@ -339,7 +315,7 @@ def spaces_of(env: Any) -> Spaces:
         return spaces.Discrete(env.n_states), spaces.Discrete(env.n_actions)
     if (task := task_of(env)) is not None:
         return task.observation_space, task.action_space
-    made = opened(env)
+    made = environments.opened(env)
     if made is not env:
         made.close()
     return made.observation_space, made.action_space
@@ -396,53 +372,53 @@ def as_learned(
     return Agent(actor, config, weights, spaces, env, rng)
 
 
-def _actor(config: Any, weights: Mapping[str, NDArray[Any]], spaces: Spaces | None) -> AnyActor:
-    if isinstance(config, ReinforceConfig | DQNConfig) and isinstance(config.network, MLP):
+def _actor(config: Any, weights: Mapping[str, NDArray[Any]], found: Spaces | None) -> AnyActor:
+    deep = isinstance(config, ReinforceConfig | DQNConfig)
+    if deep and isinstance(config.network, MLP):
         return _perceptron_actor(config, weights)
-    if spaces is None:
+    if found is None:
         raise ValueError(f"spaces must be given for {config}, got None")
     if isinstance(config, QLearningConfig):
-        return _table_actor(config, weights, spaces)
-    if not isinstance(config, ReinforceConfig | DQNConfig):
-        made: AnyActor = config.actor(weights, *spaces)
-        return made
-    n_seen = math.prod(spaces[0].shape or (1,))
-    n_actions = int(getattr(spaces[1], "n", 0))
-    n_components = 0 if n_actions else math.prod(spaces[1].shape or (1,))
-    values = isinstance(config, DQNConfig)
-    distribution = Categorical() if isinstance(config, DQNConfig) else config.policy
-    policy = make_policy(distribution, (), n_seen, n_actions, n_components)
-    own = {name: array for name, array in weights.items() if name != "log_sigma"}
-    n_in, n_out = policy.sizes.tolist()
-    module = modules.make_module(config.network, n_in, n_out, np.random.default_rng(0))
-    modules.load_arrays(module, own)
-    log_sigma = torch.tensor(weights.get("log_sigma", np.zeros(0, np.float32)))
-    return ModuleActor(
-        *(policy, module.eval(), log_sigma, np.empty(policy.action_width)),
-        scale=COLD if values else np.float32(1.0),
-        epsilon=_last_epsilon(config) if isinstance(config, DQNConfig) else 0.0,
-    )
+        return _table_actor(config, weights, *found)
+    if deep:
+        return _module_actor(config, weights, *found)
+    made: AnyActor = config.actor(weights, *found)
+    return made
 
 
 def _perceptron_actor(
     config: ReinforceConfig | DQNConfig, weights: Mapping[str, NDArray[Any]]
 ) -> AnyActor:
+    sizes, parameters = networks.pack(weights)
     if isinstance(config, DQNConfig):
-        return of_values(weights, _last_epsilon(config)).actor
-    sizes, network = networks.pack(weights)
+        actor = _cold(likelihood.make_actor(_categorical(*sizes), parameters))
+        return actor._replace(epsilon=_last_epsilon(config))
     if not isinstance(config.policy, Gaussian):
-        return likelihood.make_actor(Policy(np.array(sizes), False, False, False, 1), network)
+        return likelihood.make_actor(_categorical(*sizes), parameters)
     given = "log_sigma" in weights
     require(given, "weights", sorted(weights), "with 'log_sigma', since the policy is Gaussian")
-    log_sigma = weights["log_sigma"]
-    policy = Policy(
-        np.array(sizes),
-        True,
-        config.policy.mean == "weights",
-        config.policy.constant_feature,
-        len(log_sigma),
-    )
-    return likelihood.make_actor(policy, np.append(network, log_sigma).astype(np.float32))
+    log_sigma, weighted = weights["log_sigma"], config.policy.mean == "weights"
+    form = True, weighted, config.policy.constant_feature, len(log_sigma)
+    parameters = np.append(parameters, log_sigma).astype(np.float32)
+    return likelihood.make_actor(Policy(np.array(sizes), *form), parameters)
+
+
+def _module_actor(
+    config: ReinforceConfig | DQNConfig, weights: Mapping[str, NDArray[Any]], seen: Any, done: Any
+) -> AnyActor:
+    distribution = Categorical() if isinstance(config, DQNConfig) else config.policy
+    n_actions = int(getattr(done, "n", 0))
+    n_components = 0 if n_actions else math.prod(done.shape or (1,))
+    policy = make_policy(distribution, (), math.prod(seen.shape or (1,)), n_actions, n_components)
+    n_in, n_out = policy.sizes.tolist()
+    module = modules.make_module(config.network, n_in, n_out, np.random.default_rng(0))
+    own = {name: array for name, array in weights.items() if name != "log_sigma"}
+    modules.load_arrays(module, own)
+    log_sigma = torch.tensor(weights.get("log_sigma", np.zeros(0, np.float32)))
+    actor = ModuleActor(policy, module.eval(), log_sigma, np.empty(policy.action_width))
+    if not isinstance(config, DQNConfig):
+        return actor
+    return actor._replace(scale=COLD, epsilon=_last_epsilon(config))
 
 
 def _last_epsilon(config: DQNConfig) -> float:
@@ -451,9 +427,8 @@ def _last_epsilon(config: DQNConfig) -> float:
 
 
 def _table_actor(
-    config: QLearningConfig, weights: Mapping[str, NDArray[Any]], found: Spaces
+    config: QLearningConfig, weights: Mapping[str, NDArray[Any]], seen: Any, done: Any
 ) -> TableActor:
-    seen, done = found
     if isinstance(seen, spaces.Discrete):
         n, first = int(seen.n), float(seen.start) - 0.5
         require(n <= 2**24, "spaces", seen, "of at most 2**24 states, which float32 can count")
@@ -462,64 +437,14 @@ def _table_actor(
         require(config.bins, "bins", config.bins, f"given for observations of {seen}")
         assert config.bins is not None
         grid = make_grid(seen, config.bins)
-    epsilon = config.evaluation.epsilon
-    return _look_up(weights["Q"], grid, action_levels(done, config.levels), epsilon)
+    actions = action_levels(done, config.levels)
+    Q = floats("Q", weights["Q"], (grid.n_cells, len(actions)), finite=False)
+    policy = _categorical(len(grid.bins), len(actions), width=actions.shape[1])
+    return TableActor(policy, grid, Q, actions, config.evaluation.epsilon, np.empty(2))
 
 
-def _look_up(Q: Any, grid: Grid, actions: NDArray[np.float32], epsilon: float) -> TableActor:
-    Q = floats("Q", Q, (grid.n_cells, len(actions)), finite=False)
-    sizes = np.array([len(grid.bins), len(actions)])
-    policy = Policy(sizes, False, False, False, actions.shape[1])
-    epsilon = number("epsilon", epsilon, 0, 1)
-    return TableActor(policy, grid, Q, actions, epsilon, np.empty(2))
-
-
-def of_table(world: GriddedTask, Q: NDArray[np.float64], epsilon: float = 0.0) -> Agent:
-    """Return the epsilon-greedy policy of a table over the cells of a gridded task.
-
-    Parameters
-    ----------
-    world : GriddedTask
-        See `rl_core.worlds.discretise.gridded`.
-    Q : float64 array of shape `world.shape`
-        Action values, without NaN. Of several largest ones, one is drawn.
-    epsilon : float
-
-    Raises
-    ------
-    TypeError, ValueError
-        If an argument is not as described.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from rl_core.evaluation import evaluate, of_table
-    >>> from rl_core.worlds.discretise import gridded
-    >>> world = gridded("MountainCar-v0", 10)
-    >>> agent = of_table(world, np.zeros(world.shape))
-    >>> table = evaluate("MountainCar-v0", agent, seed=0, episodes=1, max_steps=9)
-    >>> table["steps"].item(), table["terminated"].item()
-    (9, False)
-    """
-    instance("world", world, GriddedTask, "a GriddedTask (rl_core.worlds.discretise.gridded)")
-    return Agent(_look_up(Q, world.grid, world.actions, epsilon))
-
-
-def of_values(weights: Mapping[str, NDArray[np.float32]], epsilon: float = 0.0) -> Agent:
-    """Return the epsilon-greedy policy of a network that puts out one action value an action.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from rl_core.evaluation import COLD, of_values
-    >>> agent = of_values({"layer0.weight": np.array([[1, 2]], np.float32)})
-    >>> agent.actor.parameters[:2] / COLD
-    array([1., 2.], dtype=float32)
-    """
-    sizes, parameters = networks.pack(weights)
-    epsilon = number("epsilon", epsilon, 0, 1)
-    actor = likelihood.make_actor(Policy(np.array(sizes), False, False, False, 1), parameters)
-    return Agent(_cold(actor)._replace(epsilon=epsilon))
+def _categorical(*sizes: int, width: int = 1) -> Policy:
+    return Policy(np.array(sizes), False, False, False, width)
 
 
 def greedy(agent: Agent) -> Agent:
@@ -569,9 +494,8 @@ def uniform(n_observations: int, n_actions: int) -> Agent:
     """
     n_observations = integer("n_observations", n_observations, 1)
     n_actions = integer("n_actions", n_actions, 1)
-    policy = Policy(np.array([n_observations, n_actions]), False, False, False, 1)
     zeros = np.zeros((n_observations + 1) * n_actions, np.float32)
-    return Agent(likelihood.make_actor(policy, zeros))
+    return Agent(likelihood.make_actor(_categorical(n_observations, n_actions), zeros))
 
 
 def evaluation_streams(seed: int) -> tuple[int, np.random.Generator]:
@@ -595,7 +519,6 @@ def evaluate(
     seed: int,
     episodes: int,
     max_steps: int,
-    limit: int | None = None,
     measures: Mapping[str, Measure] | None = None,
 ) -> pd.DataFrame:
     """Play episodes with a policy as it is.
@@ -612,8 +535,6 @@ def evaluate(
         How many.
     max_steps : int
         Where to stop an episode that has not ended.
-    limit : int, optional
-        A time limit, at most `max_steps`, under which the same episodes are counted as well.
     measures : mapping of str to callable, optional
         Further columns: `measure(observations, actions, rewards)` of the episode, with arrays of
         shape (T + 1, n_observations), (T, action_width) and (T,). Their names are not those of
@@ -623,9 +544,7 @@ def evaluate(
     -------
     pandas.DataFrame
         One row an episode: `episode` (from 1), `steps`, `return` (undiscounted), `terminated`
-        (false: stopped by `max_steps` or the environment's own time limit), and the measures. With
-        a limit, `limited_steps`, `limited_return` and `limited_terminated`: what they would have
-        been, had the episode been cut off there.
+        (false: stopped by `max_steps` or the environment's own time limit), and the measures.
 
     Raises
     ------
@@ -639,52 +558,40 @@ def evaluate(
     >>> table["return"].tolist(), table["terminated"].tolist()
     ([-50.0, -50.0], [False, False])
     """
-    seed, episodes, max_steps, limit = _checked(seed, episodes, max_steps, limit)
-    measures = _checked_measures(measures)
     environment_seed, rng = evaluation_streams(seed)
-    with closing(_opened(env, agent)) as world:
-        world.seed(environment_seed)
-        trajectory = Trajectory(world.n_observations, agent.actor.policy.action_width)
-        rows = []
-        for _ in range(episodes):
-            steps, terminated = play_episode(world, agent.actor, rng, max_steps, trajectory)
-            _, actions, rewards = trajectory.first(steps)
-            row = {"steps": steps, "return": rewards.sum(), "terminated": terminated}
-            row["limited_return"] = rewards[: limit or max_steps].sum()
-            for name, measure in measures.items():
-                row[name] = measure(trajectory.observations[: steps + 1], actions, rewards)
-            rows.append(row)
-    return _table(pd.DataFrame(rows), limit)
-
-
-def _table(table: pd.DataFrame, limit: int | None) -> pd.DataFrame:
-    """Number the episodes, and count them under the limit if there is one."""
-    table.insert(0, "episode", np.arange(1, len(table) + 1))
-    if limit is None:
-        return table.drop(columns="limited_return")
-    table["limited_steps"] = table["steps"].clip(upper=limit)
-    table["limited_terminated"] = table["terminated"] & (table["steps"] <= limit)
-    return table
-
-
-def _checked_measures(measures: Mapping[str, Measure] | None) -> Mapping[str, Measure]:
-    """Return the measures if they are functions under names of their own."""
-    if measures is None:
-        return {}
+    episodes = integer("episodes", episodes, 1)
+    measures = {} if measures is None else measures
     valid = isinstance(measures, Mapping) and all(callable(one) for one in measures.values())
     require(valid, "measures", measures, "a mapping of names to functions, or None")
     taken = sorted(set(measures) & set(COLUMNS))
     require(not taken, "measures", taken, f"under names other than {', '.join(COLUMNS)}")
-    return measures
+    rows = []
+    for found in _played(env, agent, environment_seed, rng, max_steps, episodes):
+        seen, done, rewards, terminated = found
+        row = {"steps": len(rewards), "return": rewards.sum(), "terminated": terminated}
+        rows.append(row | {name: of(seen, done, rewards) for name, of in measures.items()})
+    table = pd.DataFrame(rows)
+    table.insert(0, "episode", np.arange(1, len(table) + 1))
+    return table
 
 
-def _checked(
-    seed: int, episodes: int, max_steps: int, limit: int | None
-) -> tuple[int, int, int, int | None]:
+def _played(
+    env: EnvironmentLike,
+    agent: Agent,
+    environment_seed: int,
+    rng: np.random.Generator,
+    max_steps: int,
+    episodes: int,
+) -> Iterator[tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float64], bool]]:
+    """Play episodes; give observations, actions and rewards, which the next overwrites, and end."""
     max_steps = integer("max_steps", max_steps, 1)
-    if limit is not None:
-        limit = integer("limit", limit, 1, max_steps)
-    return integer("seed", seed), integer("episodes", episodes, 1), max_steps, limit
+    with closing(_opened(env, agent)) as world:
+        world.seed(environment_seed)
+        trajectory = Trajectory(world.n_observations, agent.actor.policy.action_width)
+        for _ in range(episodes):
+            steps, terminated = play_episode(world, agent.actor, rng, max_steps, trajectory)
+            _, actions, rewards = trajectory.first(steps)
+            yield trajectory.observations[: steps + 1], actions, rewards, terminated
 
 
 def check_fit(agent: Agent, world: World) -> None:
@@ -706,51 +613,41 @@ def check_fit(agent: Agent, world: World) -> None:
     instance("agent", agent, Agent, "an Agent")
     instance("world", world, World, "a world that was opened")
     actor, policy = agent.actor, agent.actor.policy
+    sizes, width = policy.sizes.tolist(), policy.action_width
+    table = isinstance(actor, TableActor)
     inputs = world.n_observations + policy.constant_feature
-    sizes = policy.sizes.tolist()
-    what = "a table over" if isinstance(actor, TableActor) else "a network of"
+    what = "a table over" if table else "a network of"
     require(sizes[0] == inputs, "agent", sizes, f"{what} {inputs} inputs")
-    width, kind = policy.action_width, "Gaussian" if policy.gaussian else "categorical"
+    kind = f"a Gaussian policy of {width}"
+    kind = kind if policy.gaussian else f"a categorical policy of {sizes[-1]}"
     if world.n_actions > 0:
         allowed = f"a categorical policy of {world.n_actions} actions"
         fits = not policy.gaussian and sizes[-1] == world.n_actions
     else:
         allowed = f"a Gaussian policy of {world.action_dimensions} components"
-        fits = policy.gaussian or isinstance(actor, TableActor)
-        fits = fits and width == world.action_dimensions
+        fits = (policy.gaussian or table) and width == world.action_dimensions
     if not fits:
-        raise ValueError(
-            f"agent must be {allowed}, got a {kind} policy of "
-            f"{width if policy.gaussian else sizes[-1]}"
-        )
+        raise ValueError(f"agent must be {allowed}, got {kind}")
     if isinstance(actor, Actor):
-        count, shape = networks.count_parameters(sizes), np.shape(actor.parameters)
-        count += policy.gaussian * width
-        require(shape == (count,), "agent", shape, f"a policy with parameters of shape ({count},)")
+        shape = (networks.count_parameters(sizes) + policy.gaussian * width,)
+        found = np.shape(actor.parameters)
+        require(found == shape, "agent", found, f"a policy with parameters of shape {shape}")
 
 
 def _opened(env: EnvironmentLike, agent: Agent) -> World:
     """Open a world for an agent that fits it; states that have a number are seen as that number."""
     instance("agent", agent, Agent, "an Agent")
-    world: World | None = None
-    if isinstance(agent.actor, TableActor) and task_of(env) is None:
-        made = opened(env)
-        if isinstance(made.observation_space, spaces.Discrete):
-            seen = spaces.Box(-np.inf, np.inf, (1,))
-            numbers = gymnasium.wrappers.TransformObservation(
-                made, lambda s: np.array([s], np.float32), seen
-            )
-            world = GymnasiumWorld(numbers, owned=made is not env)
-        elif made is not env:
-            made.close()
-    world = open_world(env) if world is None else world
+    world: World
+    if isinstance(agent.actor, TableActor) and isinstance(spaces_of(env)[0], spaces.Discrete):
+        made, seen = environments.opened(env), spaces.Box(-np.inf, np.inf, (1,))
+        numbers = gymnasium.wrappers.TransformObservation(
+            made, lambda state: np.array([state], np.float32), seen
+        )
+        world = GymnasiumWorld(numbers, owned=made is not env)
+    else:
+        world = environments.open_world(env)
     check_fit(agent, world)
     return world
-
-
-def _observed(actor: AnyActor) -> int:
-    """Return how many numbers an actor sees."""
-    return int(actor.policy.sizes[0]) - actor.policy.constant_feature
 
 
 def _native(actions: NDArray[np.float32], policy: Policy, found: Spaces | None) -> Any:
@@ -765,26 +662,24 @@ def _native(actions: NDArray[np.float32], policy: Policy, found: Spaces | None) 
 
 def _drawn(env: Any) -> gymnasium.Env[Any, Any]:
     """Open an environment that draws itself, with the time limit that it is played with here."""
+    found: Any = find(env) if isinstance(env, str) else env
     picture: dict[str, Any] = {"render_mode": "rgb_array"}
-    found = find(env) if isinstance(env, str) else env
+    if isinstance(env, str) and (task := twin(env)) is not None:
+        picture["max_episode_steps"] = task.max_episode_steps or -1
     try:
-        if isinstance(env, str) and found is None:
-            if (task := twin(env)) is not None:
-                picture["max_episode_steps"] = task.max_episode_steps or -1
-            made: Any = gymnasium.make(env, **picture)
+        if found is None:
+            found = gymnasium.make(env, **picture)
         elif isinstance(env, Make):
-            made = gymnasium.make(env.id, **{**env.arguments, **picture})
+            found = gymnasium.make(env.id, **{**env.arguments, **picture})
         elif callable(found) and not isinstance(found, gymnasium.Env):
-            taken = signature(found).parameters
-            others = any(one.kind is one.VAR_KEYWORD for one in taken.values())
-            made = found(**picture) if "render_mode" in taken or others else found()
-        else:
-            made = found
+            with suppress(TypeError):  # it takes no such argument
+                found = found(**picture)
+            found = found() if callable(found) else found
     except (gymnasium.error.Error, TypeError, ValueError) as error:
         raise ValueError(f"env must be one that can be drawn, got {env!r}: {error}") from error
-    draws = isinstance(made, gymnasium.Env) and made.render_mode == "rgb_array"
+    draws = isinstance(found, gymnasium.Env) and found.render_mode == "rgb_array"
     require(draws, "env", env, "an environment of Gymnasium's with render_mode='rgb_array'")
-    film: gymnasium.Env[Any, Any] = made
+    film: gymnasium.Env[Any, Any] = found
     return film
 
 
@@ -843,16 +738,7 @@ def rollout(
     >>> episode.observations.shape, episode.terminated
     ((101, 2), False)
     """
-    max_steps, rng = integer("max_steps", max_steps, 1), generator("rng", rng)
+    rng = generator("rng", rng)
     environment_seed = int(rng.integers(2**32))
-    with closing(_opened(env, agent)) as world:
-        world.seed(environment_seed)
-        trajectory = Trajectory(world.n_observations, agent.actor.policy.action_width)
-        steps, terminated = play_episode(world, agent.actor, rng, max_steps, trajectory)
-    return Rollout(
-        trajectory.observations[: steps + 1],
-        trajectory.actions[:steps],
-        trajectory.rewards[:steps],
-        terminated,
-        environment_seed,
-    )
+    (episode,) = _played(env, agent, environment_seed, rng, max_steps, 1)
+    return Rollout(*episode, environment_seed)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -63,47 +63,13 @@ class Linear:
 
     def values(self, episodes: int) -> F64:
         """Return the values of the first `episodes` episodes, float64 of shape (episodes,)."""
-        duration, episodes = _by_the_episode(self), integer("episodes", episodes)
-        share = np.minimum(1.0, np.arange(episodes) / duration)
-        return _between(self, duration, (1.0 - share) * self.start + share * self.end)
-
-
-@dataclass(frozen=True)
-class Geometric:
-    """A value that goes from `start` to `end` by equal factors, and stays there.
-
-    In episode k = 1, 2, ... it is start (end / start) ** min(1, (k - 1) / episodes).
-
-    Attributes
-    ----------
-    start, end : float
-        As in `Linear`, and positive.
-    episodes : int
-        How many episodes the change takes, at least 1.
-
-    Raises
-    ------
-    TypeError, ValueError
-        An attribute is not as described.
-
-    Examples
-    --------
-    >>> from rl_core.exploration import Geometric
-    >>> Geometric(0.8, 0.1, episodes=3).values(5).round(3).tolist()
-    [0.8, 0.4, 0.2, 0.1, 0.1]
-    """
-
-    start: float
-    end: float
-    episodes: int
-
-    def __post_init__(self) -> None:
-        fields(self, start=(positive,), end=(positive,), episodes=(integer, 1))
-
-    def values(self, episodes: int) -> F64:
-        """Return the values of the first `episodes` episodes, float64 of shape (episodes,)."""
-        share = np.minimum(1.0, np.arange(integer("episodes", episodes)) / self.episodes)
-        return _between(self, self.episodes, self.start * (self.end / self.start) ** share)
+        allowed = "an integer where values are asked for by the episode"
+        duration: int = instance("episodes", self.episodes, int, allowed)
+        share = np.minimum(1.0, np.arange(integer("episodes", episodes)) / duration)
+        course = (1.0 - share) * self.start + share * self.end
+        course[duration:] = self.end  # and in range, where rounding would leave it
+        low, high = sorted((self.start, self.end))
+        return np.clip(course, low, high)
 
 
 @dataclass(frozen=True)
@@ -144,8 +110,6 @@ class HalfWay:
         fields(self, start=(number, 0, 1), end=(number, 0, 1))
 
 
-Schedule = Linear | Geometric
-
 Epsilon = float | Linear | HalfWay
 """Epsilon of a deep Q-network: constant, by the environment step, or by events."""
 
@@ -164,13 +128,9 @@ def schedule_state(epsilon: Epsilon) -> F64:
     0.1
     """
     epsilon = check_epsilon("epsilon", epsilon)
-    if isinstance(epsilon, Linear):
-        entries = (epsilon.start, epsilon.start, epsilon.end, epsilon.steps, 0.0, epsilon.start)
-    elif isinstance(epsilon, HalfWay):
-        entries = (epsilon.start, epsilon.start, epsilon.end, 0, 0.5, epsilon.start)
-    else:
-        entries = (epsilon, epsilon, epsilon, 0, 0.0, epsilon)
-    return np.array(entries, np.float64)
+    start, end = (getattr(epsilon, name, epsilon) for name in ("start", "end"))
+    share = 0.5 if isinstance(epsilon, HalfWay) else 0.0
+    return np.array([start, start, end, getattr(epsilon, "steps", 0), share, start], np.float64)
 
 
 def check_epsilon(name: str, value: object) -> Epsilon:
@@ -181,16 +141,12 @@ def check_epsilon(name: str, value: object) -> Epsilon:
     >>> from rl_core.exploration import Linear, check_epsilon
     >>> check_epsilon("epsilon", Linear(1, 0, episodes=5))
     Traceback (most recent call last):
-    ValueError: epsilon must be a schedule by the environment step, got Linear(start=1.0, ...
+    ValueError: epsilon must be a schedule given in steps, got Linear(start=1.0, ...
     """
     if isinstance(value, HalfWay):
         return value
-    if isinstance(value, Linear):
-        require(value.steps is not None, name, value, "a schedule by the environment step")
-        for end in ("start", "end"):
-            number(f"{name}.{end}", getattr(value, end), 0, 1)
-        return value
-    return number(name, value, 0, 1)
+    checked: Epsilon = parameter_of(name, value, partial(number, low=0, high=1), "steps")
+    return checked
 
 
 @dataclass(frozen=True)
@@ -206,7 +162,7 @@ class VisitDecay:
 
     Attributes
     ----------
-    initial : float or Schedule
+    initial : float or Linear
         In (0, 1].
     exponent : float
         Above 0, at most 1.
@@ -223,7 +179,7 @@ class VisitDecay:
     VisitDecay(initial=1.0, exponent=0.6)
     """
 
-    initial: float | Schedule = 1.0
+    initial: float | Linear = 1.0
     exponent: float = 0.6
 
     def __post_init__(self) -> None:
@@ -239,7 +195,7 @@ class EpsilonGreedy:
 
     Attributes
     ----------
-    epsilon : float or Schedule
+    epsilon : float or Linear
         In [0, 1]. 1 minus the report's epsilon.
 
     Raises
@@ -259,13 +215,13 @@ class EpsilonGreedy:
     """
 
     kind: ClassVar[int] = EPSILON_GREEDY
-    epsilon: float | Schedule = 0.1
+    epsilon: float | Linear = 0.1
 
     def __post_init__(self) -> None:
         fields(self, epsilon=(parameter_of, partial(number, low=0, high=1)))
 
     @property
-    def parameter(self) -> float | Schedule:
+    def parameter(self) -> float | Linear:
         """Epsilon."""
         return self.epsilon
 
@@ -279,7 +235,7 @@ class Softmax:
 
     Attributes
     ----------
-    temperature : float or Schedule
+    temperature : float or Linear
         Above 0, in units of the return. The lower, the greedier.
 
     Raises
@@ -299,13 +255,13 @@ class Softmax:
     """
 
     kind: ClassVar[int] = SOFTMAX
-    temperature: float | Schedule = 1.0
+    temperature: float | Linear = 1.0
 
     def __post_init__(self) -> None:
         fields(self, temperature=(parameter_of, positive))
 
     @property
-    def parameter(self) -> float | Schedule:
+    def parameter(self) -> float | Linear:
         """The temperature."""
         return self.temperature
 
@@ -337,7 +293,7 @@ class UnnormalisedSoftmax:
     kind: ClassVar[int] = UNNORMALISED_SOFTMAX
 
     @property
-    def parameter(self) -> float | Schedule:
+    def parameter(self) -> float | Linear:
         """Not used."""
         return 1.0
 
@@ -382,7 +338,7 @@ class Trials:
         fields(self, epsilon=(number, 0, 1), **counts)
 
 
-def values(parameter: float | Schedule, episodes: int) -> F64:
+def values(parameter: float | Linear, episodes: int) -> F64:
     """Return a parameter's value in each of the first `episodes` episodes.
 
     Examples
@@ -391,13 +347,15 @@ def values(parameter: float | Schedule, episodes: int) -> F64:
     >>> values(0.5, 3).tolist(), values(Linear(1, 0, episodes=2), 3).tolist()
     ([0.5, 0.5, 0.5], [1.0, 0.5, 0.0])
     """
-    if isinstance(parameter, Schedule):
+    if isinstance(parameter, Linear):
         return parameter.values(episodes)
     return np.full(integer("episodes", episodes), number("parameter", parameter))
 
 
-def parameter_of(name: str, value: object, check: Any) -> Any:
-    """Return a number that a check accepts, or a schedule by the episode between two such.
+def parameter_of(
+    name: str, value: object, check: Any, unit: Literal["episodes", "steps"] = "episodes"
+) -> Any:
+    """Return a number that a check accepts, or a schedule, in some unit, between two such.
 
     A schedule never leaves the range between its ends, so checking these is enough.
 
@@ -409,29 +367,14 @@ def parameter_of(name: str, value: object, check: Any) -> Any:
     Traceback (most recent call last):
     ValueError: temperature.end must be a finite number above 0, got 0.0
     """
-    if isinstance(value, Schedule):
-        require(value.episodes is not None, name, value, "a schedule by the episode")
-        for end in ("start", "end"):
-            check(f"{name}.{end}", getattr(value, end))
-        return value
-    return check(name, value)
+    if not isinstance(value, Linear):
+        return check(name, value)
+    require(getattr(value, unit) is not None, name, value, f"a schedule given in {unit}")
+    for end in ("start", "end"):
+        check(f"{name}.{end}", getattr(value, end))
+    return value
 
 
 def check_step_size(name: str, value: object) -> Any:
     """Return a step size, above 0 and up to 1, or a schedule of it."""
     return parameter_of(name, value, partial(number, high=1, above=0))
-
-
-def _by_the_episode(schedule: Linear) -> int:
-    """Return the episodes of a schedule."""
-    duration: int = instance(
-        "episodes", schedule.episodes, int, "an integer where values are asked for by the episode"
-    )
-    return duration
-
-
-def _between(schedule: Schedule, episodes: int, course: F64) -> F64:
-    """Return the course without what rounding adds: in range, and at its end from then on."""
-    course[episodes:] = schedule.end
-    low, high = sorted((schedule.start, schedule.end))
-    return np.minimum(high, np.maximum(low, course))

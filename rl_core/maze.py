@@ -1,7 +1,7 @@
 """The course's Maze: collect the flags, then reach the goal, on a floor that slips.
 
 A maze is text, one letter a cell: `S` start, `G` goal, `F` flag, `W` wall, `O` open floor. `Maze`
-is a Gymnasium environment, `Maze.model` its exact model; `random_maze` draws mazes of any size.
+is a Gymnasium environment, `Maze.model` its exact model.
 """
 
 from __future__ import annotations
@@ -14,16 +14,12 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
-from numpy.typing import NDArray
 
 from rl_core import checks
 from rl_core.kernels.arrays import F64, I32, Bools
-from rl_core.kernels.compiled import compiled
 from rl_core.mdp import MDP, OwnModel
-from rl_core.worlds.maze_layout import COURSE_LAYOUT, MAX_FLAGS, find, random_layout, read_layout
+from rl_core.worlds.maze_layout import COURSE_LAYOUT, find, read_layout
 from rl_core.worlds.maze_picture import draw_maze
-
-__all__ = ["ACTIONS", "CLOCKWISE", "COURSE_LAYOUT", "MAX_FLAGS", "MOVES", "Maze", "random_maze"]
 
 ACTIONS = ("up", "down", "left", "right")
 MOVES = ((-1, 0), (1, 0), (0, -1), (0, 1))
@@ -111,7 +107,7 @@ class Maze(OwnModel, gym.Env[int, int]):
     ) -> None:
         letters = read_layout(layout)
         checks.optional("render_mode", render_mode, checks.one_of, self.metadata["render_modes"])
-        self.layout = "".join(f"{row}\n" for row in _joined(letters))
+        self.layout = "".join(f"{''.join(row)}\n" for row in letters)
         self.slip = checks.number("slip", slip, 0, 1)
         self.render_mode = render_mode
         self.walls: Bools = letters == "W"
@@ -204,16 +200,12 @@ class Maze(OwnModel, gym.Env[int, int]):
         ([8, 0], [0.9, 0.1])
         """
         if self._model is None:
-            n_states = len(self.cells) * len(self._masks)
-            shape = (n_states, len(ACTIONS), 2)
-            successor = np.empty(shape, dtype=np.int32)
-            reward = np.zeros(shape)
-            moves = self._landing, self._collects, self._with_flag, self._n_held, self._is_goal
-            _fill(successor, reward, *moves)
+            shape = (int(self.observation_space.n), len(ACTIONS), 2)
+            successor, reward = self._transitions()
             self._model = MDP(
-                successor=successor,
+                successor=successor.reshape(shape),
                 probability=np.broadcast_to(self._outcome_probabilities, shape),
-                reward=reward,
+                reward=reward.reshape(shape),
                 terminal=np.repeat(self._is_goal, len(self._masks)),
                 start_state=np.array([self.state(*self.start)], dtype=np.int32),
                 start_probability=np.ones(1),
@@ -331,15 +323,28 @@ class Maze(OwnModel, gym.Env[int, int]):
         lines = [" ".join(line) for line in letters]
         return "\n".join([*lines, f"flags held: {held or 'none'}", ""])
 
+    def _transitions(self) -> tuple[I32, F64]:
+        """Return successors and rewards, of shape (cells, flag sets, actions, outcomes)."""
+        n_cells, n_sets = len(self.cells), len(self._masks)
+        successor = np.empty((n_cells, n_sets, len(ACTIONS), 2), dtype=np.int32)
+        reward = np.zeros(successor.shape)
+        for action, turned in enumerate(CLOCKWISE):
+            for outcome, direction in enumerate((action, turned)):
+                landing, collects = self._landing[:, direction], self._collects[:, direction]
+                # Added up in place: to hold both summands would take memory.
+                successor[:, :, action, outcome] = self._with_flag[:, collects].T
+                successor[:, :, action, outcome] += n_sets * landing[:, None]
+                pays = self._is_goal[landing]
+                held = self._n_held[self._with_flag[:, collects[pays]]]
+                reward[pays, :, action, outcome] = held.T
+        goals = np.flatnonzero(self._is_goal)
+        stays = n_sets * goals[:, None] + np.arange(n_sets)
+        successor[goals], reward[goals] = stays[:, :, None, None], 0
+        return successor, reward
+
     def _info(self, state: int, probability: float, slipped: bool) -> dict[str, Any]:
-        row, column, flags = self.locate(state)
-        return {
-            "prob": probability,
-            "row": row,
-            "column": column,
-            "flags": flags,
-            "slipped": slipped,
-        }
+        place = zip(("row", "column", "flags"), self.locate(state), strict=True)
+        return {"prob": probability, **dict(place), "slipped": slipped}
 
     def _flags_held(self, flag_set: int) -> str:
         mask = self._masks[flag_set]
@@ -353,8 +358,8 @@ class Maze(OwnModel, gym.Env[int, int]):
         """
         n_flags = len(self.flag_cells)
         found = f"{len(self.cells)} free cells and {n_flags} flags"
-        few = len(self.cells) << n_flags < 2**31
-        checks.require(few, "layout", found, "of fewer than 2**31 states")
+        allowed = "of fewer than 2**31 states"
+        checks.require(len(self.cells) << n_flags < 2**31, "layout", found, allowed)
         self._cell_number = np.full(self.walls.shape, -1, dtype=np.int32)
         self._cell_number[tuple(self.cells.T)] = np.arange(len(self.cells), dtype=np.int32)
         self._bits = {flag: 1 << (n_flags - 1 - i) for i, flag in enumerate(self.flag_cells)}
@@ -365,7 +370,7 @@ class Maze(OwnModel, gym.Env[int, int]):
         self._n_held = size[self._masks]
         # Column 0: no flag is added; column 1 + i: flag i is.
         added = np.array([0, *self._bits.values()], dtype=np.int32)
-        self._with_flag = self._set_number[self._masks[:, None] | added]
+        self._with_flag = self._set_number[self._masks[:, None] | added].astype(np.uint16)
 
     def _tabulate_moves(self) -> None:
         """For each cell and direction: the cell moved to, and the flag collected (0: none)."""
@@ -385,83 +390,3 @@ class Maze(OwnModel, gym.Env[int, int]):
             landing = np.where(blocked, own, self._cell_number[row, column])
             self._landing[:, direction] = landing
             self._collects[:, direction] = np.where(blocked, 0, flag_on[landing])
-
-
-def random_maze(
-    rows: int,
-    columns: int,
-    flags: int,
-    wall_fraction: float,
-    rng: np.random.Generator,
-    slip: float = 0.1,
-) -> Maze:
-    """Draw a random maze whose goal and flags can all be reached from the start.
-
-    See `rl_core.worlds.maze_layout.random_layout` for how it is drawn.
-
-    Parameters
-    ----------
-    rows, columns : int
-        Size of the grid.
-    flags : int
-        How many flags there are, at most 16.
-    wall_fraction : float
-        Exactly `round(wall_fraction * rows * columns)` cells are walls.
-    rng : numpy.random.Generator
-        The same state of it gives the same maze.
-    slip : float
-        Probability of slipping, in [0, 1].
-
-    Returns
-    -------
-    Maze
-        The maze, not yet reset.
-
-    Raises
-    ------
-    TypeError, ValueError
-        As `random_layout` and `Maze` raise them.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from rl_core.maze import random_maze
-    >>> maze = random_maze(4, 6, flags=2, wall_fraction=0.25, rng=np.random.default_rng(1))
-    >>> maze.observation_space
-    Discrete(72)
-    """
-    return Maze(_joined(random_layout(rows, columns, flags, wall_fraction, rng)), slip=slip)
-
-
-def _joined(letters: NDArray[np.str_]) -> list[str]:
-    """Return each row of letters as one text."""
-    rows: list[str] = letters.view(f"U{letters.shape[1]}")[:, 0].tolist()
-    return rows
-
-
-@compiled
-def _fill(
-    successor: I32,
-    reward: F64,
-    landing: I32,
-    collects: NDArray[np.int8],
-    with_flag: I32,
-    n_held: NDArray[np.uint8],
-    is_goal: Bools,
-) -> None:
-    """Write successors and rewards; `reward` comes in as zeros."""
-    n_sets = len(n_held)
-    for cell in range(len(landing)):
-        for flag_set in range(n_sets):
-            state = n_sets * cell + flag_set
-            if is_goal[cell]:
-                successor[state] = state
-                continue
-            for action in range(4):
-                for outcome in range(2):
-                    direction = action if outcome == 0 else CLOCKWISE[action]
-                    to = landing[cell, direction]
-                    held = with_flag[flag_set, collects[cell, direction]]
-                    successor[state, action, outcome] = n_sets * to + held
-                    if is_goal[to]:
-                        reward[state, action, outcome] = n_held[held]

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from rl_core import checks
 from rl_core.kernels.arrays import F64, I32, Bools
 from rl_core.kernels.bounds import SUM_TOLERANCE
-from rl_core.kernels.compiled import compiled
 from rl_core.kernels.model import Model
 from rl_core.worlds.tables import read_table, start_arrays
 
@@ -144,16 +143,6 @@ class MDP:
         """The number of slots K per state and action."""
         return int(self.successor.shape[2])
 
-    @property
-    def nbytes(self) -> int:
-        """Memory the arrays take, in bytes; what a broadcast view repeats is counted once."""
-        total = 0
-        for name in self.__dataclass_fields__:
-            array: NDArray[Any] = getattr(self, name)
-            held = [n for n, stride in zip(array.shape, array.strides, strict=True) if stride]
-            total += array.itemsize * int(np.prod(held))
-        return total
-
     def arrays(self) -> Model:
         """Return the arrays as compiled code takes them."""
         return Model(*(getattr(self, name) for name in Model._fields))
@@ -172,8 +161,13 @@ class MDP:
         >>> MDP.from_env("FrozenLake-v1").reachable_states().all()
         np.True_
         """
-        start = self.start_state[self.start_probability > 0]
-        return _reachable(self.successor, self.probability, start)
+        reached = np.zeros(self.n_states, np.bool_)
+        front = self.start_state[self.start_probability > 0]
+        while len(front):
+            reached[front] = True
+            following = self.successor[front][self.probability[front] > 0]
+            front = np.unique(following[~reached[following]])
+        return reached
 
     def following(self, policy: ArrayLike) -> MDP:
         """Return the model with one action: that of a policy, an array of an action a state.
@@ -261,20 +255,17 @@ class MDP:
         return replace(model, **start_arrays(start_distribution, model.n_states))
 
     def _check_shapes(self) -> None:
-        shape = self.successor.shape
+        shape, starts = self.successor.shape, self.start_state.shape
         checks.require(0 not in shape, "successor", shape, "of a shape without an empty axis")
-        for name in ("probability", "reward"):
+        checks.require(0 not in starts, "start_state", starts, "of a shape without an empty axis")
+        for name, right, like in (
+            ("probability", shape, "successor"),
+            ("reward", shape, "successor"),
+            ("terminal", shape[:1], "the first axis of successor"),
+            ("start_probability", starts, "start_state"),
+        ):
             found = getattr(self, name).shape
-            checks.require(found == shape, name, found, f"of the shape of successor, {shape}")
-        found = self.terminal.shape
-        checks.require(found == shape[:1], "terminal", found, f"of shape {shape[:1]}")
-        lengths = len(self.start_state), len(self.start_probability)
-        checks.require(
-            0 < lengths[0] == lengths[1],
-            "start_state and start_probability",
-            f"{lengths[0]} and {lengths[1]}",
-            "of the same length, at least 1",
-        )
+            checks.require(found == right, name, found, f"of the shape of {like}, {right}")
 
     def _check_transitions(self, first: int) -> None:
         """Check some states, from `first` on."""
@@ -282,22 +273,19 @@ class MDP:
         successor, probability = self.successor[some], self.probability[some]
         reward, ends = self.reward[some], self.terminal[some, None, None]
         stays = successor == np.arange(first, first + len(successor))[:, None, None]
-        last = self.n_states - 1
-        for name, right, allowed in (
-            ("probability", _within(probability, 1), "must be from 0 to 1"),
-            ("successor", _within(successor, last), f"must be from 0 to {last}"),
-            ("reward", np.isfinite(reward), "must be finite"),
-            ("successor", stays | ~ends, "of a terminal state must be the state itself"),
-            ("reward", (reward == 0) | ~ends, "of a terminal state must be 0"),
+        last, total = self.n_states - 1, probability.sum(axis=2)
+        for name, values, right, allowed in (
+            ("probability", probability, _within(probability, 1), "must be from 0 to 1"),
+            ("successor", successor, _within(successor, last), f"must be from 0 to {last}"),
+            ("reward", reward, np.isfinite(reward), "must be finite"),
+            ("successor", successor, stays | ~ends, "of a terminal state must be the state itself"),
+            ("reward", reward, (reward == 0) | ~ends, "of a terminal state must be 0"),
+            ("probability", total, np.abs(total - 1) <= SUM_TOLERANCE, "must sum to 1"),
         ):
-            for s, a, k in np.argwhere(~right)[:1]:
-                value = getattr(self, name)[some][s, a, k]
-                found = f"at state {first + s}, action {a}, slot {k} it is {value}"
-                raise ValueError(f"{name} {allowed}, {found}")
-        total = probability.sum(axis=2)
-        for s, a in np.argwhere(np.abs(total - 1) > SUM_TOLERANCE)[:1]:
-            found = f"at state {first + s}, action {a} the sum is {total[s, a]}"
-            raise ValueError(f"probability must sum to 1, {found}")
+            for index in np.argwhere(~right)[:1]:
+                s, a, *k = index.tolist()
+                place = f"state {first + s}, action {a}" + "".join(f", slot {i}" for i in k)
+                raise ValueError(f"{name} {allowed}, at {place} it is {values[tuple(index)]}")
 
     def _check_start(self) -> None:
         for name, most in (("start_state", self.n_states - 1), ("start_probability", 1)):
@@ -373,28 +361,3 @@ def _within(values: NDArray[Any], most: int) -> Bools:
     """Mark what lies from 0 to `most`, which NaN does not."""
     within: Bools = (values >= 0) & (values <= most)
     return within
-
-
-@compiled
-def _reachable(successor: I32, probability: F64, start: I32) -> Bools:
-    """Mark what a depth-first search from `start` finds."""
-    n_states, n_actions, n_successors = successor.shape
-    reached = np.zeros(n_states, dtype=np.bool_)
-    waiting = np.empty(n_states, dtype=np.int32)  # every state waits at most once
-    n_waiting = 0
-    for s in start:
-        if not reached[s]:
-            reached[s] = True
-            waiting[n_waiting] = s
-            n_waiting += 1
-    while n_waiting > 0:
-        n_waiting -= 1
-        s = waiting[n_waiting]
-        for a in range(n_actions):
-            for k in range(n_successors):
-                following = successor[s, a, k]
-                if probability[s, a, k] > 0.0 and not reached[following]:
-                    reached[following] = True
-                    waiting[n_waiting] = following
-                    n_waiting += 1
-    return reached

@@ -5,11 +5,11 @@ algorithms: the same seed gives the same bits.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from copy import deepcopy
 from itertools import pairwise
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import torch
@@ -20,6 +20,8 @@ from rl_core.identity import imported
 from rl_core.kernels import networks
 from rl_core.kernels.arrays import F32, Arrays
 from rl_core.policies import MLP, Network
+from rl_core.training import Run, Training, train_seeds
+from rl_core.worlds.environments import EnvironmentLike, World, one_seed_of, open_world
 
 
 def perceptron(sizes: Sequence[int], parameters: F32, biases: bool = True) -> torch.nn.Sequential:
@@ -96,35 +98,27 @@ def make_module(
                 f"network must be a function (n_inputs, n_outputs), {network.function} with "
                 f"({n_inputs}, {n_outputs}) raises: {error}"
             ) from error
-        if not isinstance(module, torch.nn.Module):
-            raise ValueError(
-                f"network must make a torch.nn.Module, {network.function} made {module!r}"
-            )
-        if not any(parameter.requires_grad for parameter in module.parameters()):
-            raise ValueError(
-                f"network must have parameters that learn, {network.function} made {module!r}"
-            )
-        for batch in (1, 2):  # to act, and to learn
-            _check_output(network.function, module, batch, n_inputs, n_outputs)
-    return module
+        complaint = _complaint(module, n_inputs, n_outputs)
+    if complaint:
+        raise ValueError(f"network must {complaint}, got {network.function}")
+    return cast(torch.nn.Module, module)
 
 
-def _check_output(
-    name: str, module: torch.nn.Module, batch: int, n_inputs: int, n_outputs: int
-) -> None:
-    """Try out a copy: a call may change what a module remembers of its inputs."""
-    try:
-        with torch.no_grad():
-            shape = tuple(deepcopy(module)(torch.zeros(batch, n_inputs)).shape)
-    except Exception as error:  # it is the user's code
-        raise ValueError(
-            f"network must take inputs of shape ({batch}, {n_inputs}), {name} raises: {error}"
-        ) from error
-    if shape != (batch, n_outputs):
-        raise ValueError(
-            f"network must put out the shape (batch, {n_outputs}), of {name} it is {shape} for a "
-            f"batch of {batch}"
-        )
+def _complaint(module: object, n_inputs: int, n_outputs: int) -> str:
+    """Say what a network must do and does not, if there is anything."""
+    if not isinstance(module, torch.nn.Module):
+        return f"make a torch.nn.Module, not {module!r}"
+    if not any(parameter.requires_grad for parameter in module.parameters()):
+        return f"have parameters that learn, which {module!r} has not"
+    for batch in (1, 2):  # to act, and to learn
+        try:  # a copy, since a call may change what a module remembers of its inputs
+            with torch.no_grad():
+                shape = tuple(deepcopy(module)(torch.zeros(batch, n_inputs)).shape)
+        except Exception as error:  # it is the user's code
+            return f"take inputs of shape ({batch}, {n_inputs}) and not raise {error}"
+        if shape != (batch, n_outputs):
+            return f"put out the shape (batch, {n_outputs}), not {shape} for a batch of {batch}"
+    return ""
 
 
 @contextmanager
@@ -152,6 +146,35 @@ def reproducible(seed: int = 0) -> Iterator[None]:
     finally:
         torch.set_num_threads(threads)
         torch.set_deterministic_debug_mode(mode)
+
+
+def train_networks(
+    train: Callable[[World, Any, Training], None],
+    env: EnvironmentLike,
+    config: object,
+    *,
+    seeds: Iterable[int],
+    **arguments: Any,
+) -> Run:
+    """Train a network a seed, each in a world of its own, with torch made `reproducible`.
+
+    Parameters
+    ----------
+    train : callable
+        Trains a seed: `train(world, config, training)`.
+    env, config : object
+    seeds : iterable of int
+        Several only if a world can be opened for each.
+    **arguments : object
+        Episodes, snapshots and progress, see `rl_core.training.train_seeds`.
+    """
+
+    def train_one(training: Training) -> None:
+        with closing(open_world(env)) as world, reproducible(training.seed):
+            train(world, config, training)
+
+    seeds = one_seed_of(env, seeds)
+    return train_seeds(train_one, seeds=seeds, env=env, config=config, **arguments)
 
 
 def as_arrays(module: torch.nn.Module) -> Arrays:

@@ -18,8 +18,6 @@ right-hand side for one state and action.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -89,7 +87,6 @@ def q_value_iteration(
     *,
     gamma: float,
     threshold: float = 1e-5,
-    max_sweeps: int | None = None,
     progress: bool = True,
 ) -> Plan:
     """Repeat Q ← Σ_k p_k (r_k + γ max_a' Q(s'_k, a')) until Q hardly changes.
@@ -105,8 +102,6 @@ def q_value_iteration(
         Discount, in [0, 1 - 1e-8].
     threshold : float
         Where to stop, above 0, in units of return.
-    max_sweeps : int, optional
-        Stop after so many sweeps in any case; the table's last `norm` then tells how far it was.
     progress : bool
         Show sweeps and bound on stderr once two seconds have passed.
 
@@ -136,20 +131,19 @@ def q_value_iteration(
     """
     gamma, transitions, reward = _opened(mdp, gamma)
     threshold = checks.positive("threshold", threshold)
-    limit = checks.optional("max_sweeps", max_sweeps, checks.integer, 1) or math.inf
     Q, V, policy = _blank(mdp)
-    largest, norm = _largest(reward, gamma), math.inf
-    with _recording("Q-value iteration", progress) as record:
-        while norm >= threshold and len(record.rows) < limit:
-            residual, squares = sweeps.lookahead(transitions, reward, gamma, V, Q)
-            _, _, changes = sweeps.greedy(Q, V, policy)
-            norm = math.sqrt(squares)
-            magnitude = max(largest, _magnitude(V) + residual)
-            bound = error_bound(residual, gamma, rounding_error(mdp.n_successors, magnitude))
-            record.add(residual, norm, changes, Q.size, bound)
-            if len(record.rows) == 1 and max_sweeps is None:
-                limit = 1 + sweeps_allowed(norm * math.sqrt(Q.size), threshold, gamma)
-    if norm >= threshold and max_sweeps is None:
+    largest, norm, limit = _largest(reward, gamma), math.inf, math.inf
+    record = _Record("Q-value iteration", progress)
+    while norm >= threshold and len(record.rows) < limit:
+        residual, squares = sweeps.lookahead(transitions, reward, gamma, V, Q)
+        _, _, changes = sweeps.greedy(Q, V, policy)
+        norm = math.sqrt(squares)
+        magnitude = max(largest, _magnitude(V) + residual)
+        bound = error_bound(residual, gamma, rounding_error(mdp.n_successors, magnitude))
+        record.add(residual, norm, changes, Q.size, bound)
+        if len(record.rows) == 1:
+            limit = 1 + sweeps_allowed(norm * math.sqrt(Q.size), threshold, gamma)
+    if norm >= threshold:
         raise ArithmeticError(
             f"threshold {threshold} is below what rounding and gamma {gamma} allow: after "
             f"{len(record.rows)} sweeps the norm of the change is {norm:.1e}; ask for "
@@ -226,19 +220,18 @@ def value_iteration(
     magnitude = sweeps.expected_rewards(transitions, reward, Q)  # Q is r(s, a) for now
     bounds.check_returns("mdp", magnitude, gamma)
     bound = error_bound(magnitude, gamma, rounding_error(mdp.n_successors, magnitude))
-    with _recording("value iteration", progress) as record:
-        if bound > tolerance:  # else V = 0 will do
-            order = np.empty(mdp.n_states, dtype=np.int32)
-            ordered = sweeps.in_order(transitions, Q, mdp.terminal, gamma, order, V)
-            bound = _sweep(mdp, ordered, Q, gamma, tolerance, V, policy, magnitude, record)
-            del ordered
-            V[order], policy[order] = V.copy(), policy.copy()
-        sweeps.lookahead(transitions, reward, gamma, V, Q)
-        residual, squares, changes = sweeps.greedy(Q, V, policy)
-        magnitude = max(magnitude, _magnitude(V) + residual)
-        rounding = rounding_error(mdp.n_successors, magnitude)
-        bound = min(bound, error_bound(residual, gamma, rounding))
-        record.add(residual, math.sqrt(squares), changes, Q.size, bound, "check")
+    record = _Record("value iteration", progress)
+    if bound > tolerance:  # else V = 0 will do
+        order = np.empty(mdp.n_states, dtype=np.int32)
+        ordered = sweeps.in_order(transitions, Q, mdp.terminal, gamma, order, V)
+        bound = _sweep(mdp, ordered, Q, gamma, tolerance, V, policy, magnitude, record)
+        del ordered
+        V[order], policy[order] = V.copy(), policy.copy()
+    sweeps.lookahead(transitions, reward, gamma, V, Q)
+    residual, squares, changes = sweeps.greedy(Q, V, policy)
+    magnitude = max(magnitude, _magnitude(V) + residual)
+    bound = min(bound, error_bound(residual, gamma, rounding_error(mdp.n_successors, magnitude)))
+    record.add(residual, math.sqrt(squares), changes, Q.size, bound, "check")
     return Plan(Q, V, policy, record.table("kind"))
 
 
@@ -353,24 +346,24 @@ def policy_iteration(
     else:
         policy[:] = checked_policy("initial_policy", initial_policy, mdp)
     states, changes = np.arange(mdp.n_states), -1
-    with _recording("policy iteration", progress) as record:
-        while changes != 0:
-            if threshold is None:
-                V, evaluations = policy_evaluation(mdp, policy, gamma=gamma), 0
-            else:
-                evaluations = _evaluate(mdp, policy, gamma, threshold, V)
-            residual, squares = sweeps.lookahead(transitions, reward, gamma, V, Q)
-            best = Q.max(axis=1)
-            rounding = rounding_error(mdp.n_successors, max(largest, _magnitude(V)))
-            error = (np.abs(Q[states, policy] - V).max() + rounding) / (1 - gamma)
-            gain = best - Q[states, policy]
-            better = gain > np.maximum(2 * gamma * error, TIE * np.abs(Q).max(axis=1))
-            policy = np.where(better, greedy_policy(Q), policy)
-            changes = int(better.sum())
-            bound = error_bound(float(np.abs(best - V).max()), gamma, rounding)
-            backups = first + Q.size + evaluations * mdp.n_states
-            record.add(residual, math.sqrt(squares), changes, backups, bound, evaluations)
-            first = 0
+    record = _Record("policy iteration", progress)
+    while changes != 0:
+        if threshold is None:
+            V, evaluations = policy_evaluation(mdp, policy, gamma=gamma), 0
+        else:
+            evaluations = _evaluate(mdp, policy, gamma, threshold, V)
+        residual, squares = sweeps.lookahead(transitions, reward, gamma, V, Q)
+        best = Q.max(axis=1)
+        rounding = rounding_error(mdp.n_successors, max(largest, _magnitude(V)))
+        error = (np.abs(Q[states, policy] - V).max() + rounding) / (1 - gamma)
+        gain = best - Q[states, policy]
+        better = gain > np.maximum(2 * gamma * error, TIE * np.abs(Q).max(axis=1))
+        policy = np.where(better, greedy_policy(Q), policy)
+        changes = int(better.sum())
+        bound = error_bound(float(np.abs(best - V).max()), gamma, rounding)
+        backups = first + Q.size + evaluations * mdp.n_states
+        record.add(residual, math.sqrt(squares), changes, backups, bound, evaluations)
+        first = 0
     sweeps.greedy(Q, V, policy)
     return Plan(Q, V, policy, record.table("evaluation_sweeps"))
 
@@ -419,10 +412,8 @@ def policy_evaluation(mdp: MDP, policy: ArrayLike, *, gamma: float) -> F64:
         tolerance = max(1e-10 * largest, rounding, np.finfo(np.float64).tiny)
         return value_iteration(followed, gamma=gamma, tolerance=tolerance, progress=False).V
     S, _, K = followed.successor.shape
-    row_starts = np.arange(0, S * K + 1, K)
-    P = csr_matrix(
-        (followed.probability.ravel(), followed.successor.ravel(), row_starts), shape=(S, S)
-    )
+    entries = followed.probability.ravel(), followed.successor.ravel(), np.arange(0, S * K + 1, K)
+    P = csr_matrix(entries, shape=(S, S))
     r = (followed.probability * followed.reward).sum(axis=(1, 2))
     V: F64 = splu((identity(S) - gamma * P).tocsc()).solve(r)
     V[mdp.terminal] = 0  # exactly
@@ -548,9 +539,8 @@ def _evaluate(mdp: MDP, policy: Ints, gamma: float, threshold: float, V: F64) ->
         done += 1
         if done == 1:
             limit += sweeps_allowed(residual, threshold, gamma)
-    if residual >= max(
-        threshold, rounding_error(mdp.n_successors, max(_magnitude(reward), _magnitude(V)))
-    ):
+    magnitude = max(_magnitude(reward), _magnitude(V))
+    if residual >= max(threshold, rounding_error(mdp.n_successors, magnitude)):
         raise ArithmeticError(
             f"evaluation_threshold {threshold} is too many sweeps away for gamma {gamma}; ask for "
             f"{2 * residual:.0e} or more"
@@ -559,11 +549,12 @@ def _evaluate(mdp: MDP, policy: Ints, gamma: float, threshold: float, V: F64) ->
 
 
 class _Record:
-    """The rows of a plan's table, and the progress bar that shows the last of them."""
+    """The rows of a plan's table, and the last of them on stderr if it takes a while."""
 
-    def __init__(self, bar: tqdm[None]) -> None:
+    def __init__(self, name: str, progress: bool) -> None:
+        hidden = not checks.truth("progress", progress)
         self.rows: list[tuple[float | int | str, ...]] = []
-        self._bar = bar
+        self._bar = tqdm(desc=name, unit=" sweeps", delay=PATIENCE, disable=hidden)
 
     def add(self, residual: float, norm: float, changes: int, backups: int, *more: Any) -> None:
         """Note a sweep, with its own backups; `more` is the bound and further columns."""
@@ -573,20 +564,13 @@ class _Record:
         self._bar.update()
 
     def table(self, *columns: str) -> pd.DataFrame:
-        """Return the rows as a table; `columns` are the further ones."""
+        """Return the rows as a table, and end the display; `columns` are the further ones."""
+        self._bar.close()
         names = ["residual", "norm", "policy_changes", "backups", "bound", *columns]
         table = pd.DataFrame(self.rows, columns=names)
         table["backups"] = table["backups"].cumsum()
         table.insert(0, "sweep", np.arange(1, len(table) + 1))
         return table
-
-
-@contextmanager
-def _recording(name: str, progress: bool) -> Iterator[_Record]:
-    """Give a record, and show it on stderr if it takes a while."""
-    hidden = not checks.truth("progress", progress)
-    with tqdm(desc=name, unit=" sweeps", delay=PATIENCE, disable=hidden) as bar:
-        yield _Record(bar)
 
 
 def _opened(mdp: MDP, gamma: float) -> tuple[float, Transitions, F64]:

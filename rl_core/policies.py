@@ -87,9 +87,8 @@ class Module:
     code: str = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        require(
-            callable(imported("function", self.function)), "function", self.function, "callable"
-        )
+        found = imported("function", self.function)
+        require(callable(found), "function", self.function, "callable")
         object.__setattr__(self, "code", code_behind(self.function))
 
 
@@ -214,13 +213,8 @@ def make_policy(
     weighted = distribution.mean == "weights"
     n_features = n_observations + distribution.constant_feature
     n_outputs = action_dimensions * (n_features if weighted else 1)
-    return Policy(
-        np.array([n_features, *hidden, n_outputs]),
-        True,
-        weighted,
-        distribution.constant_feature,
-        action_dimensions,
-    )
+    form = True, weighted, distribution.constant_feature, action_dimensions
+    return Policy(np.array([n_features, *hidden, n_outputs]), *form)
 
 
 def initial_parameters(

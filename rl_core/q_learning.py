@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple
 
 import gymnasium as gym
@@ -33,7 +33,7 @@ from numba.extending import register_jitable
 from numpy.typing import ArrayLike
 
 from rl_core import checks, exploration
-from rl_core.exploration import EpsilonGreedy, ExplorationRule, Schedule, Trials, VisitDecay
+from rl_core.exploration import EpsilonGreedy, ExplorationRule, Linear, Trials, VisitDecay
 from rl_core.kernels import appraisal
 from rl_core.kernels.appraisal import Appraisal, Yardstick
 from rl_core.kernels.arrays import F64, I64, Arrays
@@ -41,15 +41,14 @@ from rl_core.kernels.choices import EPSILON_GREEDY, choose, step_size
 from rl_core.kernels.compiled import compiled
 from rl_core.kernels.model import NO_MODEL
 from rl_core.mdp import MDP
-from rl_core.planning import optimal_actions, value_iteration
+from rl_core.planning import optimal_actions
 from rl_core.training import Failure, Progress, Run
 from rl_core.worlds import tabular
-from rl_core.worlds.discretise import Discretised, GriddedTask, checked_bins, gridded, task_of
+from rl_core.worlds.discretise import Discretised, checked_bins, gridded, task_of
 from rl_core.worlds.environments import EnvironmentLike, one_seed_of
 from rl_core.worlds.tabular import DiscreteWorld, Draws, Played, start, step
 
 NO_LIMIT = 2**62
-Q_STAR_TOLERANCE = 1e-10
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ class QLearningConfig:
     ----------
     gamma : float
         Discount, in [0, 1].
-    step_size : float or Schedule or VisitDecay
+    step_size : float or Linear or VisitDecay
         alpha, in (0, 1].
     exploration : EpsilonGreedy or Softmax or UnnormalisedSoftmax
         How actions are chosen while learning.
@@ -90,7 +89,7 @@ class QLearningConfig:
     """
 
     gamma: float = 0.9
-    step_size: float | Schedule | VisitDecay = 0.2
+    step_size: float | Linear | VisitDecay = 0.2
     exploration: ExplorationRule = field(default_factory=EpsilonGreedy)
     max_steps: int | None = None
     max_env_steps: int | None = 10_000_000
@@ -202,11 +201,12 @@ def q_learning(
     at = checks.integers("snapshots", snapshots, 0, episodes)
     if progress is not None:
         checks.instance("progress", progress, Callable, "a function of episodes and steps, or None")
-    with _opened(env, config) as (_, model, shape):
+    with _opened(env, config) as (world, model, shape):
         _check_memory(config, shape, len(seeds) * (1 + len(at)))
         yardstick = make_yardstick(model, Q_star, shape)
-    task, record = _task(config, episodes), appraisal.empty_record(len(seeds), episodes)
-    arrays, failures = _empty_arrays(len(seeds), len(at), shape), []
+        task = _task(config, episodes, getattr(world, "max_steps", 0) or NO_LIMIT)
+    record, failures = appraisal.empty_record(len(seeds), episodes), []
+    arrays = _empty_arrays(len(seeds), len(at), shape)
     for i, seed in enumerate(seeds):
         own = {name: array[i] for name, array in arrays.items()}
         with _opened(env, config) as (world, _, _):
@@ -242,89 +242,6 @@ def check_q_learning(env: object, config: object) -> None:
 def _check_memory(config: QLearningConfig, shape: tuple[int, int], tables: int) -> None:
     """Raise if the machine cannot hold so many tables of values and of visits."""
     checks.in_memory("bins", config.bins, 16 * shape[0] * shape[1] * tables)
-
-
-def q_learning_on_model(
-    env: str,
-    config: QLearningConfig,
-    *,
-    episodes: int,
-    seeds: Iterable[int],
-    snapshots: Iterable[int] = (),
-    progress: Progress | None = None,
-) -> Run:
-    """Learn on the exact model of an environment, compiled, measured against the optimal values.
-
-    The same bits as `q_learning` on the environment itself, several hundred times sooner. The
-    environment must play what its table says and nothing else (Taxi's options do not).
-
-    Parameters
-    ----------
-    env : str
-        The id of an environment that `MDP.from_env` can read. Its time limit cuts episodes off as
-        `config.max_steps` does.
-    config, episodes, seeds, snapshots, progress
-        As in `q_learning`; `gamma` below 1, as planning needs it.
-
-    Returns
-    -------
-    Run
-        As `q_learning` returns it.
-
-    Raises
-    ------
-    TypeError, ValueError
-        An argument is not as described.
-
-    Examples
-    --------
-    >>> from rl_core.exploration import EpsilonGreedy
-    >>> from rl_core.q_learning import QLearningConfig, q_learning_on_model
-    >>> config = QLearningConfig(exploration=EpsilonGreedy(0.9))
-    >>> run = q_learning_on_model("rl_core/Maze-v0", config, episodes=2000, seeds=[0])
-    >>> run.table["error_norm"].iloc[[0, -1]].round().tolist()  # it cannot get below 7.957
-    [25.0, 8.0]
-    """
-    check_q_learning_on_model(env, config)
-    model = MDP.from_env(env)
-    limit = gym.spec(env).max_episode_steps
-    if limit is not None:
-        evaluation = replace(config.evaluation, max_steps=min(limit, config.evaluation.max_steps))
-        max_steps = min(limit, config.max_steps or limit)
-        config = replace(config, max_steps=max_steps, evaluation=evaluation)
-    Q_star = value_iteration(
-        model, gamma=config.gamma, tolerance=Q_STAR_TOLERANCE, progress=False
-    ).Q
-    return q_learning(
-        model,
-        config,
-        episodes=episodes,
-        seeds=seeds,
-        Q_star=Q_star,
-        snapshots=snapshots,
-        progress=progress,
-    )
-
-
-def check_q_learning_on_model(env: object, config: object) -> None:
-    """Raise what `q_learning_on_model` would raise for an environment and a configuration.
-
-    Raises
-    ------
-    TypeError, ValueError
-        If `env` is no id or has no model, or `config` is no QLearningConfig with gamma below 1.
-
-    Examples
-    --------
-    >>> from rl_core.q_learning import QLearningConfig, check_q_learning_on_model
-    >>> check_q_learning_on_model("rl_core/Maze-v0", QLearningConfig())
-    """
-    checks.instance("env", env, str, "an environment's id")
-    checks.instance("config", config, QLearningConfig, "a QLearningConfig")
-    assert isinstance(env, str)
-    assert isinstance(config, QLearningConfig)
-    checks.require(config.gamma < 1, "gamma", config.gamma, "below 1, for planning")
-    check_q_learning(MDP.from_env(env), config)
 
 
 @contextmanager
@@ -399,7 +316,10 @@ class _Task(NamedTuple):
     trial_epsilon: float
 
 
-def _task(config: QLearningConfig, episodes: int) -> _Task:
+def _task(config: QLearningConfig, episodes: int, limit: int) -> _Task:
+    """Lay a configuration out over the episodes of a world with a time limit of its own."""
+    trials = {f"trial_{name}": value for name, value in asdict(config.evaluation).items()}
+    trials["trial_max_steps"] = min(config.evaluation.max_steps, limit)
     if isinstance(config.step_size, VisitDecay):
         initial, exponent = config.step_size.initial, config.step_size.exponent
     else:
@@ -410,12 +330,9 @@ def _task(config: QLearningConfig, episodes: int) -> _Task:
         step_size=exploration.values(initial, episodes),
         exponent=exponent,
         gamma=config.gamma,
-        max_steps=config.max_steps or NO_LIMIT,
+        max_steps=min(config.max_steps or NO_LIMIT, limit),
         max_env_steps=config.max_env_steps or NO_LIMIT,
-        trial_every=config.evaluation.every,
-        trial_episodes=config.evaluation.episodes,
-        trial_max_steps=config.evaluation.max_steps,
-        trial_epsilon=config.evaluation.epsilon,
+        **trials,
     )
 
 
@@ -511,11 +428,10 @@ def _update(
 
 def _empty_arrays(n_seeds: int, n_snapshots: int, shape: tuple[int, int]) -> Arrays:
     """Return tables and counts of zeros for every seed, and room for the snapshots of both."""
-    arrays: Arrays = {}
-    for name, dtype in (("Q", np.float64), ("visits", np.int64)):
-        arrays[name] = np.zeros((n_seeds, *shape), dtype)
-    for name in ("Q", "visits") if n_snapshots else ():
-        arrays[f"{name}_snapshots"] = np.zeros((n_seeds, n_snapshots, *shape), arrays[name].dtype)
+    kinds = {"Q": np.float64, "visits": np.int64}
+    arrays: Arrays = {name: np.zeros((n_seeds, *shape), kind) for name, kind in kinds.items()}
+    for name, kind in kinds.items() if n_snapshots else ():
+        arrays[f"{name}_snapshots"] = np.zeros((n_seeds, n_snapshots, *shape), kind)
     return arrays
 
 
@@ -530,22 +446,19 @@ def _train(
 ) -> Failure | None:
     """Run one seed, pausing at the snapshots; return why it failed, if it did."""
     learn = _learn if isinstance(world, Played) else _learn_compiled
-    draws, known = tabular.spawn_draws(seed, 2), appraisal.new_appraisal(yardstick)
+    draws, trial_draws = tabular.spawn_draws(seed, 2)
     if isinstance(world, Played):
         world.env.reset(seed=seed)  # for what else the environment draws from
-    if isinstance(world, GriddedTask) and world.max_steps > 0:
-        trial_max_steps = min(task.trial_max_steps, world.max_steps)
-        max_steps = min(task.max_steps, world.max_steps)
-        task = task._replace(max_steps=max_steps, trial_max_steps=trial_max_steps)
-    first, episodes = 0, len(record)
-    for last in sorted({*snapshots, episodes}):
-        Q, visits = arrays["Q"], arrays["visits"]
+    known, first = appraisal.new_appraisal(yardstick), 0
+    Q, visits = arrays["Q"], arrays["visits"]
+    for last in sorted({*snapshots, len(record)}):
         stopped = learn(
-            world, task, yardstick, known, draws[0], draws[1], Q, visits, record, first, last
+            world, task, yardstick, known, draws, trial_draws, Q, visits, record, first, last
         )
         ended = stopped < last  # then later snapshots are of the last table
-        for j in [j for j, at in enumerate(snapshots) if at == last or (ended and at > last)]:
-            arrays["Q_snapshots"][j], arrays["visits_snapshots"][j] = arrays["Q"], arrays["visits"]
+        for j, at in enumerate(snapshots):
+            if at == last or (ended and at > last):
+                arrays["Q_snapshots"][j], arrays["visits_snapshots"][j] = Q, visits
         if ended:
             bad = not np.isfinite(record[stopped, appraisal.RETURN])
             return Failure(seed, stopped + 1, "the return is not finite") if bad else None

@@ -38,8 +38,8 @@ from rl_core.kernels.arrays import F32, F64, I64, Arrays
 from rl_core.kernels.compiled import compiled
 from rl_core.kernels.likelihood import Actor, Policy
 from rl_core.policies import MLP, Categorical, Gaussian, Network
-from rl_core.training import Progress, Run, Training, spawn_streams, train_seeds
-from rl_core.worlds.environments import EnvironmentLike, World, one_seed_of, open_world
+from rl_core.training import Progress, Run, Training, spawn_streams
+from rl_core.worlds.environments import EnvironmentLike, World, open_world
 from rl_core.worlds.episodes import ModuleActor, Trajectory, play_episode, with_constant
 
 
@@ -298,10 +298,9 @@ def _train(world: World, config: ReinforceConfig, training: Training) -> None:
     streams = spawn_streams(training.seed)
     world.seed(streams.environment_seed)
     actor, learn, arrays = _make_agent(config, world, streams.network)
-    training.keep("initial/", arrays())
     trajectory = Trajectory(world.n_observations, actor.policy.action_width)
     centre, scale = config.normalise != "none", config.normalise == "standard"
-    for episode in training.course(config.max_env_steps):
+    for _ in training.course(config.max_env_steps, arrays):
         max_steps = training.max_steps(config.max_episode_steps)
         steps, terminated = play_episode(world, actor, streams.policy, max_steps, trajectory)
         observations, actions, rewards = trajectory.first(steps)
@@ -310,11 +309,6 @@ def _train(world: World, config: ReinforceConfig, training: Training) -> None:
         if training.failure is None and (terminated or config.learn_from_capped):
             v = normalised(discounted_returns(rewards, config.gamma), centre, scale)
             learn(observations, actions, v, _orders(config, steps, streams.network))
-            if not all(np.isfinite(array).all() for array in arrays().values()):
-                training.fail("a weight is not finite after learning")
-        if training.wants(episode):
-            training.keep(f"episode{episode}/", arrays())
-    training.keep("", arrays())
 
 
 def check_reinforce(env: EnvironmentLike, config: ReinforceConfig) -> None:
@@ -379,11 +373,5 @@ def reinforce(
     ([1, 2, 1, 2], (2, 6, 4))
     """
     instance("config", config, ReinforceConfig, "a ReinforceConfig")
-
-    def train(training: Training) -> None:
-        with closing(open_world(env)) as world, modules.reproducible(training.seed):
-            _train(world, config, training)
-
-    seeds = one_seed_of(env, seeds)
-    told: Any = {"progress": progress, "env": env, "config": config}
-    return train_seeds(train, episodes=episodes, seeds=seeds, snapshots=snapshots, **told)
+    told: Any = {"episodes": episodes, "snapshots": snapshots, "progress": progress}
+    return modules.train_networks(_train, env, config, seeds=seeds, **told)

@@ -7,8 +7,8 @@ of improvement take infinities as they are, of either sign. What would have to a
 no number, and refused. Values may be integers, truth values, fractions or floats of any width.
 """
 
-from collections.abc import Callable, Sequence
-from typing import Any, Literal, NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -50,7 +50,7 @@ def iqm(values: ArrayLike, axis: int = 0) -> Any:
     """
     values = _array("values", values, 1, 2)
     axis = checks.integer("axis", axis, -values.ndim, values.ndim - 1)
-    return _averaged("values", values, stats.trim_mean, 0.25, axis=axis)
+    return _averaged(values, stats.trim_mean, 0.25, axis=axis)
 
 
 def bootstrap_interval(
@@ -106,81 +106,24 @@ def bootstrap_interval(
     >>> estimate, low, high
     (97.0, 88.0, 120.0)
     """
-    return _bootstrap("values", _array("values", values, 1, 2), statistic, rng, level, resamples)
-
-
-def _bootstrap(
-    name: str,
-    values: F64,
-    statistic: Statistic,
-    rng: np.random.Generator,
-    level: float,
-    resamples: int,
-    anything: float | None = None,
-) -> Interval:
     level, resamples = _checked_draws(rng, level, resamples)
-    unknown = np.isnan(values.T).any(axis=-1)
-    checks.require(values.ndim == 2 or not unknown, name, values, "without NaN")
-    n_seeds = len(values)
-    points = values.reshape(n_seeds, -1).T.copy()
-    trim = _trim(statistic, n_seeds)
-    counts = _seed_counts(n_seeds, resamples, rng)
+    values = _array("values", values, 1, 2)
+    points = values.reshape(len(values), -1).T.copy()
+    unknown = values.ndim == 1 and np.isnan(values).any()
+    checks.require(not unknown, "values", values, "without NaN")
+    trim = _trim(statistic, len(values))
+    counts = _seed_counts(len(values), resamples, rng)
     low, high = np.empty(len(points)), np.empty(len(points))
     for start in range(0, len(points), POINTS_AT_ONCE):
         part = slice(start, start + POINTS_AT_ONCE)
         order = np.argsort(points[part], axis=1)
         ordered = np.take_along_axis(points[part], order, axis=1)
         low[part], high[part] = _limits(_trimmed_means(ordered, order, counts, trim), level)
-    estimate = _averaged(name, points, statistic, axis=1, anything=anything)
+    estimate = _averaged(points, statistic, axis=1)
     low[np.isnan(estimate)] = high[np.isnan(estimate)] = np.nan
     if values.ndim == 1:
         return _interval(float(estimate[0]), float(low[0]), float(high[0]))
     return _interval(estimate, low, high)
-
-
-def paired_difference_interval(
-    a: ArrayLike,
-    b: ArrayLike,
-    statistic: Statistic = np.median,
-    *,
-    rng: np.random.Generator,
-    level: float = 0.95,
-    resamples: int = 10_000,
-) -> Interval:
-    """Return the bootstrap interval of a statistic of a - b, seed by seed.
-
-    Parameters
-    ----------
-    a, b : array, shape (seeds,) or (seeds, points)
-        Two arms with the same seeds in the same order. Infinite where a seed never gets there: so
-        is its difference, and 0 where it does in neither arm. Of these only a median can be taken;
-        where any number would be one, between minus and plus infinity, it is 0: no difference.
-    statistic, rng, level, resamples
-        As in `bootstrap_interval`.
-
-    Raises
-    ------
-    TypeError, ValueError
-        An argument is not as described.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from rl_core.statistics import paired_difference_interval
-    >>> rng = np.random.default_rng(0)
-    >>> paired_difference_interval([5.0, 7.0, 9.0], [4.0, 5.0, 6.0], np.mean, rng=rng).estimate
-    2.0
-    >>> paired_difference_interval([np.inf, 7.0, np.inf], [4.0, 5.0, np.inf], rng=rng).estimate
-    2.0
-    """
-    a, b = _array("a", a, 1, 2), _array("b", b, 1, 2)
-    checks.require(a.shape == b.shape, "b", b.shape, f"of the shape of a, {a.shape}")
-    if np.isinf(a).any() or np.isinf(b).any():
-        allowed = "np.median where a or b is infinite for some seed"
-        checks.require(statistic is np.median, "statistic", statistic, allowed)
-    with np.errstate(invalid="ignore", over="ignore"):
-        differences = np.where(np.isinf(a) & (a == b), 0.0, a - b)
-    return _bootstrap("a - b", differences, statistic, rng, level, resamples, anything=0.0)
 
 
 def probability_of_improvement(
@@ -223,12 +166,9 @@ def probability_of_improvement(
     >>> tuple(probability_of_improvement([np.inf], [np.inf], rng=rng))
     (0.5, 0.0, 1.0)
     """
-    a, b = (
-        checks.floats("a", a, (None,), finite=False),
-        checks.floats("b", b, (None,), finite=False),
-    )
-    checks.require(len(a), "a", a, "not empty")
-    checks.require(len(b), "b", b, "not empty")
+    a, b = _array("a", a, 1), _array("b", b, 1)
+    for name, arm in (("a", a), ("b", b)):
+        checks.require(not np.isnan(arm).any(), name, arm, "without NaN")
     level, resamples = _checked_draws(rng, level, resamples)
     if np.isposinf(a).all() and np.isposinf(b).all():
         return Interval(0.5, 0.0, 1.0)
@@ -236,8 +176,8 @@ def probability_of_improvement(
     halves = 2.0 * (a[:, None] < b) + (a[:, None] == b)
     drawn_a, drawn_b = (_seed_counts(len(arm), resamples, rng) for arm in (a, b))
     all_pairs = 2.0 * len(a) * len(b)
-    low, high = _limits(np.sum((drawn_a @ halves) * drawn_b, axis=1) / all_pairs, level)
-    return _interval(float(halves.sum() / all_pairs), float(low), float(high))
+    limits = _limits(np.sum((drawn_a @ halves) * drawn_b, axis=1) / all_pairs, level)
+    return _interval(float(halves.sum() / all_pairs), *map(float, limits))
 
 
 def proportion_interval(successes: int, trials: int, *, level: float = 0.95) -> Interval:
@@ -263,86 +203,6 @@ def proportion_interval(successes: int, trials: int, *, level: float = 0.95) -> 
     successes = checks.integer("successes", successes, 0, trials)
     limits = stats.binomtest(successes, trials).proportion_ci(level, method="wilson")
     return _interval(successes / trials, float(limits.low), float(limits.high))
-
-
-def learning_curves(
-    table: pd.DataFrame,
-    column: str = "steps",
-    *,
-    seeds: Sequence[int],
-    episodes: int,
-    window: int = 1,
-    average: Literal["median", "mean"] = "median",
-) -> F64:
-    """Return a column of one arm's table as one curve a seed, smoothed over the last episodes.
-
-    Parameters
-    ----------
-    table : pandas.DataFrame
-        With the columns `seed`, `episode` (from 1) and `column`; one row a seed and episode.
-        Infinities are averaged like other numbers; NaN is refused.
-    column : str
-        What is drawn.
-    seeds : sequence of int
-        The rows of the result: all seeds that were run, so that none that failed goes missing.
-    episodes : int
-        The length of the result.
-    window : int
-        The trailing window, at least 1: point t is the average over episodes t - window + 1 to t,
-        fewer at the start.
-    average : {"median", "mean"}
-        The average.
-
-    Returns
-    -------
-    numpy.ndarray, shape (seeds, episodes), float64
-        NaN where a seed has no such episode: after it stopped.
-
-    Raises
-    ------
-    TypeError, ValueError
-        The table has several rows for a seed and episode (several arms), no such column, other
-        seeds or episodes than those asked for, or a window that averages infinities of both signs.
-
-    Examples
-    --------
-    >>> import pandas as pd
-    >>> from rl_core.statistics import learning_curves
-    >>> table = pd.DataFrame({"seed": [0, 0, 1], "episode": [1, 2, 1], "steps": [90, 70, 80]})
-    >>> learning_curves(table, seeds=[0, 1, 2], episodes=2, window=2)
-    array([[90., 80.],
-           [80., nan],
-           [nan, nan]])
-    """
-    seeds, episodes = checks.distinct_seeds(seeds), checks.integer("episodes", episodes, 1)
-    window = checks.integer("window", window, 1)
-    checks.one_of("average", average, ("median", "mean"))
-    checks.instance("table", table, pd.DataFrame, "a pandas.DataFrame")
-    checks.instance("column", column, str, "the name of a column")
-    missing = {"seed", "episode", column} - set(table.columns)
-    allowed = f"with the columns {sorted(missing)} too, where column is {column!r}"
-    checks.require(not missing, "table", list(table.columns), allowed)
-    checks.floats(column, table[column], (None,), finite=False)
-    twice = table.duplicated(["seed", "episode"]).any()
-    checks.require(not twice, "table", "several rows for a seed and episode", "of a single arm")
-    wide = table.pivot(index="episode", columns="seed", values=column)
-    others = sorted(set(wide.columns) - set(seeds))
-    checks.require(not others, "seeds", seeds, f"all that the table has, {others} too")
-    fits = wide.index.isin(range(1, episodes + 1)).all()
-    longest = f"{wide.index.min()} to {wide.index.max()}"
-    checks.require(fits, "episodes", episodes, f"1 to the last of the table, which has {longest}")
-    wide = wide.astype(np.float64).reindex(index=range(1, episodes + 1), columns=list(seeds))
-    trailing = wide.rolling(window, min_periods=1)
-    smooth = trailing.median() if average == "median" else trailing.mean()
-    curves = smooth.where(wide.notna()).to_numpy().T.copy()
-    # pandas leaves infinities out: windows that have one are averaged here.
-    infinite = wide.isin([np.inf, -np.inf]).astype(float)
-    windows = infinite.rolling(window, min_periods=1).max() > 0
-    statistic = np.median if average == "median" else np.mean
-    for t, i in np.argwhere((windows & wide.notna()).to_numpy()):
-        seen = wide.iloc[max(0, t + 1 - window) : t + 1, i].dropna().to_numpy()
-        curves[i, t] = _averaged(column, seen, statistic, axis=0)
-    return curves
 
 
 def learned(curves: ArrayLike, threshold: float, *, window: int) -> Bools:
@@ -383,42 +243,6 @@ def learned(curves: ArrayLike, threshold: float, *, window: int) -> Bools:
         return np.asarray(np.median(curves[:, -window:], axis=1) <= threshold)
 
 
-def episodes_to_threshold(curves: ArrayLike, threshold: float, *, hold: int = 1) -> F64:
-    """Return the episode from which each seed stays at or below `threshold` for `hold` episodes.
-
-    Parameters
-    ----------
-    curves : array, shape (seeds, episodes)
-        Usually smoothed.
-    threshold : float
-        In the units of the curves.
-    hold : int
-        Episodes in a row, 1 to their number.
-
-    Returns
-    -------
-    numpy.ndarray, shape (seeds,), float64
-        Episodes counted from 1; infinity for seeds that never do (censored: they might, later).
-
-    Raises
-    ------
-    TypeError, ValueError
-        `curves` has another shape, `hold` does not fit into it, or `threshold` is NaN.
-
-    Examples
-    --------
-    >>> from rl_core.statistics import episodes_to_threshold
-    >>> episodes_to_threshold([[9.0, 3.0, 9.0, 2.0, 1.0], [9.0, 9.0, 9.0, 9.0, 3.0]], 3, hold=2)
-    array([ 4., inf])
-    """
-    curves = _array("curves", curves, 2)
-    hold = checks.integer("hold", hold, 1, curves.shape[1])
-    threshold = checks.floats("threshold", [threshold], (1,), finite=False)[0]
-    windows = np.lib.stride_tricks.sliding_window_view(curves <= threshold, hold, axis=1)
-    below = np.all(windows, axis=2)
-    return np.where(below.any(axis=1), below.argmax(axis=1) + 1.0, np.inf)
-
-
 @compiled
 def _trimmed_means(ordered: F64, order: I64, counts: I64, trim: int) -> F64:
     """Return the trimmed mean of each draw at each point, shape (points, resamples).
@@ -446,13 +270,10 @@ def _trimmed_means(ordered: F64, order: I64, counts: I64, trim: int) -> F64:
 
 def _trim(statistic: Statistic, n: int) -> int:
     """Return how many of n ordered values `statistic` leaves out at either end."""
-    if statistic is np.mean:
-        return 0
-    if statistic is iqm:
-        return n // 4
-    if statistic is np.median:
-        return (n - 1) // 2
-    raise ValueError(f"statistic must be np.median, np.mean or iqm, got {statistic!r}")
+    trims = (np.mean, 0), (iqm, n // 4), (np.median, (n - 1) // 2)
+    found = [trim for known, trim in trims if statistic is known]
+    checks.require(found, "statistic", statistic, "np.median, np.mean or iqm")
+    return found[0]
 
 
 def _seed_counts(n_seeds: int, resamples: int, rng: np.random.Generator) -> I64:
@@ -466,8 +287,7 @@ def _limits(drawn: F64, level: float) -> tuple[Any, Any]:
     No interpolation, because between two infinities there is no number. A draw that is none, since
     it averages both, counts as the one for the lower limit and as the other for the upper.
     """
-    nothing = np.isnan(drawn)
-    lowest, highest = np.where(nothing, -np.inf, drawn), np.where(nothing, np.inf, drawn)
+    lowest, highest = (np.where(np.isnan(drawn), end, drawn) for end in (-np.inf, np.inf))
     low = np.quantile(lowest, (1 - level) / 2, axis=-1, method="lower")
     high = np.quantile(highest, (1 + level) / 2, axis=-1, method="higher")
     return low, high
@@ -480,25 +300,13 @@ def _interval(estimate: Any, low: Any, high: Any) -> Interval:
     return Interval(estimate, np.minimum(low, estimate), np.maximum(high, estimate))
 
 
-def _averaged(
-    name: str,
-    values: F64,
-    statistic: Statistic,
-    *trim: float,
-    axis: int,
-    anything: float | None = None,
-) -> Any:
-    """Return a statistic of values, NaN where they have one.
-
-    Between infinities of both signs there is anything: refused, unless it is said what to take.
-    """
+def _averaged(values: F64, statistic: Statistic, *trim: float, axis: int) -> Any:
+    """Return a statistic of values, NaN where they have one; refuse infinities of both signs."""
     with np.errstate(invalid="ignore"):
         middle = np.asarray(statistic(values, *trim, axis=axis))
     unknown = np.isnan(values).any(axis=axis)
-    between = np.isnan(middle) & ~unknown
     allowed = "without infinities of both signs in the middle"
-    checks.require(anything is not None or not between.any(), name, values, allowed)
-    middle[between] = anything
+    checks.require(not np.isnan(middle[~unknown]).any(), "values", values, allowed)
     return np.where(unknown, np.nan, middle)
 
 
@@ -520,6 +328,5 @@ def _array(name: str, values: ArrayLike, *dimensions: int) -> F64:
 
 def _checked_draws(rng: object, level: float, resamples: int) -> tuple[float, int]:
     checks.generator("rng", rng)
-    return checks.number("level", level, above=0, below=1), checks.integer(
-        "resamples", resamples, 1
-    )
+    level = checks.number("level", level, above=0, below=1)
+    return level, checks.integer("resamples", resamples, 1)

@@ -3,7 +3,7 @@
 import importlib
 import math
 import sys
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from rl_core.checks import distinct_seeds, instance, integer, integers, require
+from rl_core.kernels.arrays import Arrays
 
 PROGRESS_EVERY = 10
 """Episodes between two reports of progress."""
@@ -151,7 +152,7 @@ class Training:
     --------
     >>> from rl_core.training import Training
     >>> training = Training(seed=0, episodes=3, snapshots=(), report=lambda episodes, steps: None)
-    >>> for episode in training.course(max_env_steps=25):
+    >>> for episode in training.course(max_env_steps=25, learned=dict):
     ...     training.add(steps=10, total=-10.0, terminated=True)
     >>> training.table()["env_steps"].tolist()
     [10, 20, 30]
@@ -162,20 +163,38 @@ class Training:
     ) -> None:
         self.seed, self.episodes, self.env_steps = seed, episodes, 0
         self.failure: Failure | None = None
-        self.kept: dict[str, dict[str, NDArray[Any]]] = {}
+        self.kept: dict[str, Arrays] = {}
         self._snapshots, self._report = set(snapshots), report
         self._rows: list[tuple[int, float, bool]] = []
         self._budget = sys.maxsize
 
-    def course(self, max_env_steps: int | None) -> Iterator[int]:
-        """Yield the numbers of the episodes, until they, the budget or the seed itself end."""
+    def course(self, max_env_steps: int | None, learned: Callable[[], Arrays]) -> Iterator[int]:
+        """Yield the numbers of the episodes, until they, the budget or the seed itself end.
+
+        Parameters
+        ----------
+        max_env_steps : int or None
+            The budget.
+        learned : callable
+            Gives the arrays that are learned, by name. Copies are kept before the first episode,
+            after the last, and at the snapshots; one that is not finite ends the seed.
+        """
         self._budget = max_env_steps or sys.maxsize
+        self._keep("initial/", learned())
         for episode in range(1, self.episodes + 1):
             yield episode
+            if not all(np.isfinite(array).all() for array in learned().values()):
+                self.fail("a weight is not finite")
+            if episode in self._snapshots:
+                self._keep(f"episode{episode}/", learned())
             if episode % PROGRESS_EVERY == 0:
                 self._report(episode, self.env_steps)
             if self.failure is not None or self.env_steps >= self._budget:
-                return
+                break
+        self._keep("", learned())
+
+    def _keep(self, moment: str, arrays: Arrays) -> None:
+        self.kept[moment] = {name: np.array(array) for name, array in arrays.items()}
 
     def max_steps(self, *limits: int | None) -> int:
         """Return where an episode has to stop: at the least of limits and the budget's rest."""
@@ -192,14 +211,6 @@ class Training:
         """End the seed with this episode."""
         self.failure = self.failure or Failure(self.seed, len(self._rows), reason)
 
-    def wants(self, episode: int) -> bool:
-        """Say whether to `keep` what is learned after this episode."""
-        return episode in self._snapshots
-
-    def keep(self, moment: str, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Keep copies of arrays under the name of a moment: "", "initial/", "episode20/"."""
-        self.kept[moment] = {name: np.array(array) for name, array in arrays.items()}
-
     def table(self) -> pd.DataFrame:
         """Return one row an episode."""
         table = pd.DataFrame(self._rows, columns=["steps", "return", "terminated"])
@@ -208,9 +219,9 @@ class Training:
         table["env_steps"] = table["steps"].cumsum()
         return table
 
-    def arrays(self, snapshots: Collection[int]) -> dict[str, NDArray[Any]]:
+    def arrays(self) -> Arrays:
         """Return what was kept, by moment and name; a moment never reached is the last one."""
-        moments = ["", "initial/", *(f"episode{n}/" for n in sorted(set(snapshots) - {0}))]
+        moments = ["", "initial/", *(f"episode{n}/" for n in sorted(self._snapshots - {0}))]
         return {
             moment + name: array
             for moment in moments
@@ -233,7 +244,7 @@ def train_seeds(
     Parameters
     ----------
     train : callable
-        Trains `training.seed`: adds a row an episode and keeps what is learned at last under "".
+        Trains `training.seed`: goes through `training.course` and adds a row an episode.
     episodes : int
         Episodes a seed, at least 1.
     seeds : iterable of int
@@ -256,9 +267,8 @@ def train_seeds(
     >>> import numpy as np
     >>> from rl_core.training import train_seeds
     >>> def train(training):
-    ...     for _ in training.course(None):
+    ...     for _ in training.course(None, lambda: {"weights": np.zeros(3)}):
     ...         training.add(steps=7, total=1.0, terminated=True)
-    ...     training.keep("", {"weights": np.zeros(3)})
     >>> run = train_seeds(train, episodes=2, seeds=[0, 1])
     >>> len(run.table), run.arrays["weights"].shape
     (4, (2, 3))
@@ -269,33 +279,23 @@ def train_seeds(
     if progress is not None:
         instance("progress", progress, Callable, "a function of episodes and steps, or None")
     done: list[Training] = []
+
+    def report(now: int, steps: int) -> None:
+        if progress is not None:
+            progress(len(done) * episodes + now, sum(one.env_steps for one in done) + steps)
+
     for seed in seeds:
-        steps_before = sum(one.env_steps for one in done)
-        episodes_before = len(done) * episodes
-
-        def report(
-            now: int, steps: int, before: int = episodes_before, more: int = steps_before
-        ) -> None:
-            if progress is not None:
-                progress(before + now, more + steps)
-
         training = Training(seed, episodes, snapshots, report)
         train(training)
-        allowed = "a function that keeps under '' what is learned at last"
+        allowed = "a function that goes through training.course to its end"
         require("" in training.kept, "train", train, allowed)
-        done.append(training)
         report(episodes, training.env_steps)
-    return Run(
-        pd.concat([one.table() for one in done], ignore_index=True),
-        _stacked([one.arrays(snapshots) for one in done]),
-        tuple(one.failure for one in done if one.failure is not None),
-        env,
-        config,
-    )
-
-
-def _stacked(kept: Sequence[Mapping[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
-    return {name: np.stack([arrays[name] for arrays in kept]) for name in kept[0]}
+        done.append(training)
+    table = pd.concat([one.table() for one in done], ignore_index=True)
+    kept = [one.arrays() for one in done]
+    arrays = {name: np.stack([of_seed[name] for of_seed in kept]) for name in kept[0]}
+    failures = tuple(one.failure for one in done if one.failure is not None)
+    return Run(table, arrays, failures, env, config)
 
 
 def weights_of(

@@ -36,7 +36,7 @@ from rl_core.checks import number
 from rl_core.dqn import DQNConfig
 from rl_core.evaluation import Agent, as_learned, spaces_of, uniform
 from rl_core.experiments import Arm
-from rl_core.exploration import Geometric, Linear, Trials
+from rl_core.exploration import Linear, Trials
 from rl_core.maze import Maze
 from rl_core.mdp import MDP
 from rl_core.policies import MLP, Categorical, Gaussian
@@ -118,10 +118,6 @@ def maze() -> Maze:
     return made
 
 
-def world() -> discretise.GriddedTask:
-    return discretise.gridded("MountainCar-v0", 3)
-
-
 def cut() -> discretise.Discretised:
     made = discretise.Discretised("MountainCar-v0", 3)
     made.reset(seed=0)
@@ -133,8 +129,8 @@ def learn(*_: Any, **__: Any) -> Any:
 
 
 def train(training: Training) -> None:
-    training.add(1, 1.0, True)
-    training.keep("", {"a": np.zeros(1)})
+    for _ in training.course(None, lambda: {"a": np.zeros(1)}):
+        training.add(1, 1.0, True)
 
 
 def agent() -> Agent:
@@ -144,10 +140,6 @@ def agent() -> Agent:
 
 def settings(config: Any) -> dict[str, Any]:
     return {field.name: getattr(config, field.name) for field in fields(config) if field.init}
-
-
-def table() -> pd.DataFrame:
-    return pd.DataFrame({"seed": [0, 0], "episode": [1, 2], "steps": [9.0, 7.0]})
 
 
 SAVED = "saved.npz"  # an agent, where `main` makes the calls
@@ -176,12 +168,10 @@ CALLS: dict[str, Callable[[], dict[str, Any]]] = {
                                       "env": None, "rng": None},
     "evaluation.check_fit": lambda: {"agent": uniform(2, 3), "world": open_world("MountainCar-v0")},
     "evaluation.evaluate": lambda: {"env": "MountainCar-v0", "agent": uniform(2, 3), "seed": 0,
-                                    "episodes": 1, "max_steps": 9, "limit": 5, "measures": None},
+                                    "episodes": 1, "max_steps": 9, "measures": None},
     "evaluation.evaluation_streams": lambda: {"seed": 0},
     "evaluation.greedy": lambda: {"agent": uniform(2, 3)},
     "evaluation.load": lambda: {"path": SAVED, "rng": None},
-    "evaluation.of_table": lambda: {"world": world(), "Q": np.zeros((9, 3)), "epsilon": 0.1},
-    "evaluation.of_values": lambda: {"weights": WEIGHTS, "epsilon": 0.1},
     "evaluation.rollout": lambda: {"env": "MountainCar-v0", "agent": uniform(2, 3), "rng": rng(),
                                    "max_steps": 9},
     "evaluation.spaces_of": lambda: {"env": "MountainCar-v0"},
@@ -193,8 +183,6 @@ CALLS: dict[str, Callable[[], dict[str, Any]]] = {
                                        "seeds": [0], "store": "store",
                                        "workers": 1, "backend": "loky", "progress": False},
     "exploration.EpsilonGreedy": lambda: {"epsilon": 0.1},
-    "exploration.Geometric": lambda: {"start": 1.0, "end": 0.1, "episodes": 3},
-    "exploration.Geometric.values": lambda: {"self": Geometric(1.0, 0.1, 3), "episodes": 3},
     "exploration.HalfWay": lambda: {"start": 0.9, "end": 0.1},
     "exploration.Linear": lambda: {"start": 1.0, "end": 0.1, "episodes": 3, "steps": None},
     "exploration.Linear.values": lambda: {"self": Linear(1.0, 0.1, 3), "episodes": 3},
@@ -214,8 +202,6 @@ CALLS: dict[str, Callable[[], dict[str, Any]]] = {
     "maze.Maze.reset": lambda: {"self": maze(), "seed": 0, "options": None},
     "maze.Maze.state": lambda: {"self": maze(), "row": 0, "column": 0, "flags": "A"},
     "maze.Maze.step": lambda: {"self": maze(), "action": 0},
-    "maze.random_maze": lambda: {"rows": 4, "columns": 4, "flags": 1, "wall_fraction": 0.1,
-                                 "rng": rng(), "slip": 0.1},
     "mdp.MDP": lambda: settings(lake()),
     "mdp.MDP.following": lambda: {"self": lake(), "policy": np.zeros(16, int)},
     "mdp.MDP.from_env": lambda: {"env": "FrozenLake-v1", "start_distribution": np.eye(16)[0]},
@@ -230,7 +216,7 @@ CALLS: dict[str, Callable[[], dict[str, Any]]] = {
                                           "evaluation_threshold": 0.1,
                                           "initial_policy": np.zeros(16, int)},
     "planning.q_value_iteration": lambda: {"mdp": lake(), "gamma": 0.9, "threshold": 0.1,
-                                           "max_sweeps": 3, "progress": False},
+                                           "progress": False},
     "planning.value_iteration": lambda: {"mdp": lake(), "gamma": 0.9, "tolerance": 0.1,
                                          "progress": False},
     "policies.Gaussian": lambda: settings(Gaussian()),
@@ -239,24 +225,15 @@ CALLS: dict[str, Callable[[], dict[str, Any]]] = {
     "policies.check_network": lambda: {"network": MLP(), "engine": None},
     "q_learning.QLearningConfig": lambda: settings(TABULAR),
     "q_learning.check_q_learning": lambda: {"env": lake(), "config": TABULAR},
-    "q_learning.check_q_learning_on_model": lambda: {"env": "FrozenLake-v1", "config": TABULAR},
     "q_learning.q_learning": lambda: {"env": lake(), "config": TABULAR,
                                       "Q_star": np.zeros((16, 4)), **SHORT},
-    "q_learning.q_learning_on_model": lambda: {"env": "FrozenLake-v1", "config": TABULAR, **SHORT},
     "reinforce.ReinforceConfig": lambda: settings(LINEAR),
     "reinforce.check_reinforce": lambda: {"env": "MountainCar-v0", "config": LINEAR},
     "reinforce.reinforce": lambda: {"env": "MountainCar-v0", "config": LINEAR, **SHORT},
     "statistics.bootstrap_interval": lambda: {"values": [1.0, 2.0], "statistic": np.median,
                                               "rng": rng(), **DRAWN},
-    "statistics.episodes_to_threshold": lambda: {"curves": np.ones((2, 3)), "threshold": 1.0,
-                                                 "hold": 2},
     "statistics.iqm": lambda: {"values": [1.0, 2.0, 3.0], "axis": 0},
     "statistics.learned": lambda: {"curves": np.ones((2, 3)), "threshold": 1.0, "window": 2},
-    "statistics.learning_curves": lambda: {"table": table(), "column": "steps", "seeds": [0],
-                                           "episodes": 2, "window": 1, "average": "median"},
-    "statistics.paired_difference_interval": lambda: {"a": [1.0, 2.0], "b": [1.0, 3.0],
-                                                      "statistic": np.median, "rng": rng(),
-                                                      **DRAWN},
     "statistics.probability_of_improvement": lambda: {"a": [1.0, 2.0], "b": [1.0, 3.0],
                                                       "rng": rng(), **DRAWN},
     "statistics.proportion_interval": lambda: {"successes": 1, "trials": 3, "level": 0.9},
@@ -276,8 +253,6 @@ CALLS: dict[str, Callable[[], dict[str, Any]]] = {
     "worlds.environments.one_seed_of": lambda: {"env": "MountainCar-v0", "seeds": [0]},
     "worlds.environments.open_world": lambda: {"env": "MountainCar-v0"},
     "worlds.environments.opened": lambda: {"env": "MountainCar-v0"},
-    "worlds.maze_layout.random_layout": lambda: {"rows": 4, "columns": 4, "flags": 1,
-                                                 "wall_fraction": 0.1, "rng": rng()},
     "worlds.maze_layout.read_layout": lambda: {"layout": "SG"},
     "worlds.names.Make": lambda: {"id": "CartPole-v1", "arguments": {}},
     "worlds.names.find": lambda: {"env": "CartPole-v1"},
@@ -314,6 +289,7 @@ INSIDE = {
     "modules.as_arrays": "of what make_module returns",
     "modules.make_module": "inside the learners, of a config and a world that were checked",
     "modules.perceptron": "inside make_module",
+    "modules.train_networks": "inside the learners; what it is told is checked by train_seeds",
     "modules.reproducible": "around training; its seed is a seed that was checked",
     "planning.Plan": "returned",
     "policies.initial_parameters": "of what make_policy returns",

@@ -6,10 +6,11 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from rl_core.maze import Maze, random_maze
+from rl_core.maze import Maze
 from rl_core.mdp import MDP
 from rl_core.planning import policy_evaluation, policy_iteration, value_iteration
 from studies.certificate import certify
+from studies.random_mazes import random_maze
 
 TENTH, THIRD = Fraction(1, 10), Fraction(1, 3)
 COURSE = [TENTH, 9 * TENTH]

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from toy_task import Corridor
 
-from rl_core.evaluation import evaluate, of_table
+from rl_core.evaluation import evaluate, greedy
 from rl_core.exploration import EpsilonGreedy, Trials
 from rl_core.q_learning import QLearningConfig, q_learning
 from rl_core.worlds.discretise import (
@@ -304,23 +304,11 @@ def test_a_user_s_own_task_is_learned_through_a_grid_and_evaluated():
     np.testing.assert_allclose(Q[4, 1], -1.0, atol=1e-6)
     np.testing.assert_allclose(Q[3, 1], -1.9, atol=1e-3)
     assert (Q[:, 1] > Q[:, 0])[:5].all()
-    world = gridded("toy_task:Corridor", 5)
-    assert world.max_steps == 100
-    played = evaluate("toy_task:Corridor", of_table(world, Q), seed=0, episodes=20, max_steps=50)
+    assert gridded("toy_task:Corridor", 5).max_steps == 100
+    agent = greedy(run.agent(0))
+    played = evaluate("toy_task:Corridor", agent, seed=0, episodes=20, max_steps=50)
     assert played["terminated"].all()
     assert set(played["steps"]) == {4, 5}
-
-
-def test_a_limit_of_one_step_counts_one_step():
-    world = gridded("MountainCar-v0", 2)
-    arguments = {"seed": 0, "episodes": 2, "max_steps": 3}
-    agent = of_table(world, np.zeros(world.shape))
-    table = evaluate("MountainCar-v0", agent, limit=1, **arguments)
-    assert table["limited_steps"].tolist() == [1, 1]
-    assert table["limited_return"].tolist() == [-1.0, -1.0]
-    assert table["return"].tolist() == [-3.0, -3.0]
-    with pytest.raises(ValueError, match=r"^limit must be an integer from 1 to 3"):
-        evaluate("MountainCar-v0", agent, limit=0, **arguments)
 
 
 def test_a_grid_is_plain_arrays():

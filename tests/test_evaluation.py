@@ -12,18 +12,19 @@ from rl_core.evaluation import (
     evaluate,
     evaluation_streams,
     greedy,
-    of_table,
-    of_values,
     rollout,
+    spaces_of,
     uniform,
 )
 from rl_core.kernels import networks
 from rl_core.kernels.likelihood import Policy, make_actor
 from rl_core.policies import MLP, Gaussian, Module
+from rl_core.q_learning import QLearningConfig
 from rl_core.reinforce import ReinforceConfig, reinforce
 from rl_core.training import spawn_streams, weights_of
 from rl_core.worlds.discretise import Discretised, gridded
 from studies.policy_maps import action_values, mean_actions
+from studies.shared import of_table, of_values
 
 PUMP = {"layer0.weight": np.array([[1e-7, 0, -1e-7], [-1, 0, 1]], np.float32)}
 """Push the way the car moves, and to the right from rest: Q(s, a) = (a - 1) (v - 1e-7 x)."""
@@ -155,35 +156,9 @@ def test_any_other_environment():
     assert (table["return"] > 100).all()
 
 
-def test_under_a_limit_the_same_episodes_are_cut():
-    name = "MountainCarContinuous-v0"
-    world = gridded(name, (1, 2), levels=3)
-    Q = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    network = {"layer0.weight": np.array([[0], [50]]), "log_sigma": np.array([-3])}
-    agent = as_learned(
-        ReinforceConfig(network=MLP(()), policy=Gaussian(mean="direct")),
-        {name: array.astype(np.float32) for name, array in network.items()},
-    )
-    for play in (
-        lambda **cut: evaluate(name, of_table(world, Q), seed=0, episodes=30, **cut),
-        lambda **cut: evaluate(name, agent, seed=0, episodes=30, **cut),
-    ):
-        long = play(max_steps=10_000, limit=106)
-        assert long["terminated"].all()
-        within = long["steps"] <= 106
-        assert 0 < within.sum() < 30
-        np.testing.assert_array_equal(long["limited_terminated"], within)
-        np.testing.assert_array_equal(long["limited_steps"], np.minimum(long["steps"], 106))
-        np.testing.assert_array_equal(long["limited_return"][within], long["return"][within])
-        assert (long["limited_return"][~within] < 0).all()
-        first = play(max_steps=106).iloc[0]
-        assert first["steps"] == long["limited_steps"].iloc[0]
-        assert first["return"] == pytest.approx(long["limited_return"].iloc[0], abs=1e-12)
-
-
 def test_bad_arguments():
     agent = uniform(2, 3)
-    for bad in ({"seed": -1}, {"episodes": 0}, {"max_steps": 0.5}, {"limit": 6}):
+    for bad in ({"seed": -1}, {"episodes": 0}, {"max_steps": 0.5}):
         arguments = {"seed": 0, "episodes": 1, "max_steps": 5} | bad
         with pytest.raises((TypeError, ValueError), match=f"^{next(iter(bad))} must be .*, got "):
             evaluate("MountainCar-v0", agent, **arguments)
@@ -233,12 +208,12 @@ def test_an_agent_that_does_not_fit_its_environment_is_refused(env, agent, messa
     ],
 )
 def test_a_table_of_something_else_is_refused(Q, message):
-    world = gridded("MountainCar-v0", 5)
+    config, where = QLearningConfig(bins=5), spaces_of("MountainCar-v0")
     with pytest.raises((TypeError, ValueError), match=f"^Q must be {message}"):
-        of_table(world, Q)
+        as_learned(config, {"Q": Q}, spaces=where)
 
 
-@pytest.mark.parametrize("measures", [{"steps": max}, {"limited_return": max}, {"a": 3}, [max]])
+@pytest.mark.parametrize("measures", [{"steps": max}, {"return": max}, {"a": 3}, [max]])
 def test_measures_do_not_take_the_place_of_a_column(measures):
     with pytest.raises(ValueError, match=r"^measures must be .*, got "):
         evaluate(

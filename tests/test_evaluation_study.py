@@ -6,9 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rl_core.evaluation import evaluate, uniform
+from rl_core.evaluation import as_learned, evaluate, uniform
+from rl_core.policies import MLP, Gaussian
+from rl_core.reinforce import ReinforceConfig
 from rl_core.worlds import shaping
+from rl_core.worlds.discretise import gridded
 from studies import evaluation as study
+from studies.shared import of_table
 
 
 def _policies(name, steps, returns):
@@ -61,6 +65,29 @@ def test_shaped_returns_are_those_that_dqn_learns_from():
             study.ENV[name], uniform(n, 3), seed=0, episodes=3, max_steps=80, measures=measures
         )
         np.testing.assert_allclose(table["ours"], seen, rtol=1e-6)
+
+
+def test_under_a_limit_the_same_episodes_are_cut(monkeypatch):
+    monkeypatch.setattr(study, "EPISODES", 30)
+    name = "MountainCarContinuous-v0"
+    network = {"layer0.weight": np.array([[0], [50]]), "log_sigma": np.array([-3])}
+    pushes = as_learned(
+        ReinforceConfig(network=MLP(()), policy=Gaussian(mean="direct")),
+        {name: array.astype(np.float32) for name, array in network.items()},
+    )
+    for agent in (of_table(gridded(name, (1, 2), levels=3), np.eye(3)[[0, 2]]), pushes):
+        long = study.evaluate_both(name, agent, 106, seed=0, measures={"one": lambda *_: 1})
+        assert long["terminated"].all()
+        assert (long["one"] == 1).all()
+        within = long["steps"] <= 106
+        assert 0 < within.sum() < 30
+        np.testing.assert_array_equal(long["limited_terminated"], within)
+        np.testing.assert_array_equal(long["limited_steps"], np.minimum(long["steps"], 106))
+        np.testing.assert_array_equal(long["limited_return"][within], long["return"][within])
+        assert (long["limited_return"][~within] < 0).all()
+        first = evaluate(name, agent, seed=0, episodes=1, max_steps=106).iloc[0]
+        assert first["steps"] == long["limited_steps"].iloc[0]
+        assert first["return"] == pytest.approx(long["limited_return"].iloc[0], abs=1e-12)
 
 
 def test_the_gentler_the_driver_the_more_it_gets_and_the_longer_it_takes():

@@ -12,7 +12,6 @@ from odd_values import ODD, PLAIN, try_out
 
 from rl_core.exploration import (
     EpsilonGreedy,
-    Geometric,
     HalfWay,
     Linear,
     Softmax,
@@ -34,15 +33,10 @@ def by_steps(start=0.5, end=0.1, steps=3):
     return Linear(start, end, steps=steps)
 
 
-def geometric(start=0.5, end=0.1, episodes=3):
-    return Geometric(start, end, episodes)
-
-
-@pytest.mark.parametrize("schedule", [by_episodes, geometric])
 @settings(deadline=None)
 @given(start=st.floats(1e-3, 1), end=st.floats(1e-3, 1), length=st.integers(1, 50))
-def test_schedules_go_from_start_to_end_and_stay(schedule, start, end, length):
-    course = schedule(start, end, length).values(length + 5)
+def test_schedules_go_from_start_to_end_and_stay(start, end, length):
+    course = by_episodes(start, end, length).values(length + 5)
     assert course[0] == start
     assert (course[length:] == end).all()
     assert min(start, end) <= course.min() <= course.max() <= max(start, end)
@@ -50,10 +44,8 @@ def test_schedules_go_from_start_to_end_and_stay(schedule, start, end, length):
     assert (changes >= -1e-15).all() or (changes <= 1e-15).all()
 
 
-def test_linear_steps_are_equal_and_geometric_factors_are():
-    linear, shrinking = by_episodes(0.2, 1.0, 4).values(5), geometric(0.1, 0.8, 3).values(4)
-    assert linear == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
-    assert shrinking == pytest.approx([0.1, 0.2, 0.4, 0.8])
+def test_linear_steps_are_equal():
+    assert by_episodes(0.2, 1.0, 4).values(5) == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
 
 
 # Schedules in the wrong unit
@@ -75,7 +67,7 @@ def test_a_schedule_is_by_the_episode_or_by_the_step():
 )
 def test_tables_refuse_a_schedule_by_the_step(make, name):
     make(by_episodes())
-    with pytest.raises(ValueError, match=rf"^{name} must be a schedule by the episode, got Linear"):
+    with pytest.raises(ValueError, match=rf"^{name} must be a schedule given in episodes, got"):
         make(by_steps())
     with pytest.raises(TypeError, match=rf"^{name} must be .*, got HalfWay"):
         make(HalfWay())
@@ -83,10 +75,8 @@ def test_tables_refuse_a_schedule_by_the_step(make, name):
 
 def test_networks_refuse_a_schedule_by_the_episode():
     assert check_epsilon("epsilon", by_steps()) == by_steps()
-    with pytest.raises(ValueError, match=r"^epsilon must be a schedule by the environment step"):
+    with pytest.raises(ValueError, match=r"^epsilon must be a schedule given in steps"):
         check_epsilon("epsilon", by_episodes())
-    with pytest.raises(TypeError, match=r"^epsilon must be .*, got Geometric"):
-        check_epsilon("epsilon", geometric())
     with pytest.raises(ValueError, match=r"^epsilon.start must be a number from 0 to 1, got 1.5"):
         check_epsilon("epsilon", by_steps(start=1.5))
 
@@ -117,7 +107,6 @@ def test_a_schedule_s_state_begins_at_its_start():
         (lambda: Softmax(-1.0), ValueError, "temperature must .*, got -1.0"),
         (lambda: Softmax(math.inf), ValueError, "temperature must .*, got inf"),
         (lambda: Softmax(by_episodes(1.0, 0.0)), ValueError, "temperature.end must .*, got 0.0"),
-        (lambda: geometric(0.5, 0.0), ValueError, "end must be a finite number above 0, got 0.0"),
         (lambda: by_episodes(0.5, math.nan), ValueError, "end must .*, got nan"),
         (lambda: by_episodes(episodes=0), ValueError, "episodes must be an integer from 1.*got 0"),
         (lambda: by_episodes(episodes=2.5), TypeError, "episodes must .*, got 2.5"),
@@ -149,7 +138,7 @@ def test_edges_that_are_allowed():
 
 @pytest.mark.parametrize(
     "make",
-    [by_episodes, by_steps, geometric, HalfWay, VisitDecay, EpsilonGreedy, Softmax, Trials],
+    [by_episodes, by_steps, HalfWay, VisitDecay, EpsilonGreedy, Softmax, Trials],
     ids=lambda make: make.__name__,
 )
 @settings(max_examples=60, deadline=None)
@@ -183,7 +172,7 @@ def test_rules_can_be_written_as_json_and_told_apart(rule):
 @pytest.mark.parametrize(
     "rule",
     [
-        *(Linear(1, 0, episodes=2), Geometric(1, 0.5, 2), HalfWay(), VisitDecay(), Trials()),
+        *(Linear(1, 0, episodes=2), HalfWay(), VisitDecay(), Trials()),
         *(EpsilonGreedy(), Softmax()),
     ],
 )

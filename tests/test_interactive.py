@@ -96,8 +96,9 @@ def test_scripts_are_there_and_ask_for_nothing_from_elsewhere():
 def test_sweeps_are_those_of_planning(gamma):
     sweeps = maze_sweeps(MAZE, gamma)
     assert not sweeps.V[0].any()
-    for k in (1, 2, len(sweeps.V) - 1):
-        plan = q_value_iteration(MODEL, gamma=gamma, max_sweeps=k)
+    for threshold in (10.0, 1.0, 1e-5):
+        plan = q_value_iteration(MODEL, gamma=gamma, threshold=threshold)
+        k = len(plan.table)
         assert np.array_equal(sweeps.V[k], plan.Q.max(axis=1))
         assert np.array_equal(sweeps.best[k], optimal_actions(plan.Q))
     last = sweeps.round_policy[-1]

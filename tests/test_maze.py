@@ -17,8 +17,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rl_core  # noqa: F401  (registers the Maze)
-from rl_core.maze import CLOCKWISE, COURSE_LAYOUT, Maze, random_maze
+from bench.planning import held_bytes
+from rl_core.maze import CLOCKWISE, Maze
 from rl_core.mdp import MDP
+from rl_core.worlds.maze_layout import COURSE_LAYOUT
+from studies.random_mazes import random_maze
 
 COURSE_CELLS = [
     (0, 0), (1, 0), (3, 0), (1, 1), (2, 1), (3, 1), (0, 2),
@@ -360,10 +363,6 @@ ODD = [
 MADE = Maze()
 CALLS = {
     Maze: {"layout": "SG", "slip": 0.1, "render_mode": None},
-    random_maze: {
-        "rows": 3, "columns": 3, "flags": 1, "wall_fraction": 0.1,
-        "rng": np.random.default_rng(0), "slip": 0.1,
-    },
     MADE.state: {"row": 0, "column": 0, "flags": ""},
     MADE.locate: {"state": 0},
     MDP: {
@@ -603,21 +602,9 @@ def test_a_model_of_a_million_states_takes_a_hundred_bytes_a_state() -> None:
     finally:
         tracemalloc.stop()
     assert model.n_states == 354 * 354 * 8
-    assert model.nbytes <= 98 * model.n_states
+    assert held_bytes(model) <= 98 * model.n_states
     assert peak <= 100 * model.n_states
     assert maze.model() is model
-
-
-def test_random_maze_is_a_maze_of_the_asked_size() -> None:
-    maze = random_maze(7, 9, 2, 0.3, np.random.default_rng(0), slip=0.2)
-    assert maze.walls.shape == (7, 9)
-    assert maze.walls.sum() == round(0.3 * 63)
-    assert maze.observation_space.n == (63 - 19) * 4
-    assert maze.slip == 0.2
-    other = random_maze(7, 9, 2, 0.3, np.random.default_rng(0), slip=0.2)
-    assert maze.layout == other.layout
-    with pytest.raises(ValueError, match="slip"):
-        random_maze(7, 9, 2, 0.3, np.random.default_rng(0), slip=2.0)
 
 
 def test_importing_the_package_does_not_import_torch() -> None:

@@ -10,10 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
+from bench.planning import held_bytes
 from rl_core import planning
 from rl_core.kernels import bounds, sweeps
 from rl_core.kernels.bounds import error_bound
-from rl_core.maze import Maze, random_maze
+from rl_core.maze import Maze
 from rl_core.mdp import MDP
 from rl_core.planning import (
     backup,
@@ -24,6 +25,7 @@ from rl_core.planning import (
     q_value_iteration,
     value_iteration,
 )
+from studies.random_mazes import random_maze
 
 PLANNERS = {
     "q_value_iteration": lambda mdp, gamma: q_value_iteration(mdp, gamma=gamma, threshold=1e-10),
@@ -243,8 +245,8 @@ def test_value_iteration_keeps_its_tolerance(seed, gamma, tolerance, terminals):
 def test_every_bound_holds(seed, gamma):
     mdp = random_model(np.random.default_rng(seed))
     Q = backup(mdp, exact_values(mdp, gamma), gamma=gamma)
-    for n_sweeps in (1, 2, 5, 30):
-        plan = q_value_iteration(mdp, gamma=gamma, max_sweeps=n_sweeps)
+    for threshold in (1e3, 1.0, 0.1, 1e-3):
+        plan = q_value_iteration(mdp, gamma=gamma, threshold=threshold)
         assert np.abs(plan.Q - Q).max() <= plan.table["bound"].iloc[-1] + 1e-10
     for planner in PLANNERS.values():
         plan = planner(mdp, gamma)
@@ -301,12 +303,6 @@ def test_residuals_contract():
         assert (residual[1:] <= gamma * residual[:-1] + rounding).all()
         bound = gamma ** np.arange(len(residual)) * residual[0]
         assert (residual <= bound + rounding / (1 - gamma)).all()
-
-
-def test_max_sweeps_stops_early():
-    plan = q_value_iteration(Maze().model(), gamma=0.9, max_sweeps=3)
-    assert len(plan.table) == 3
-    assert plan.table["norm"].iloc[-1] > 1e-5
 
 
 def test_table_of_value_iteration():
@@ -451,7 +447,7 @@ def test_memory_within_200_bytes_a_state():
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
-    assert (mdp.nbytes + peak) / mdp.n_states <= 200
+    assert (held_bytes(mdp) + peak) / mdp.n_states <= 200
 
 
 def test_greedy_policy_and_optimal_actions():
@@ -522,8 +518,10 @@ PAID_FOR_STAYING = model([[[0]]], np.ones((1, 1, 1)), np.ones((1, 1, 1)))
 @pytest.mark.parametrize("gamma", [0.5, 0.9, 0.999])
 def test_the_bound_of_q_value_iteration_is_attained(gamma):
     exact = 1 / (1 - gamma)
-    for n_sweeps in (1, 2, 7, 40):
-        plan = q_value_iteration(PAID_FOR_STAYING, gamma=gamma, max_sweeps=n_sweeps)
+    for n_sweeps in (1, 2, 7, 40):  # number k changes Q by gamma ** (k - 1)
+        threshold = 1.0001 * gamma ** (n_sweeps - 1)
+        plan = q_value_iteration(PAID_FOR_STAYING, gamma=gamma, threshold=threshold)
+        assert len(plan.table) == n_sweeps
         error, bound = exact - plan.V[0], plan.table["bound"].iloc[-1]
         assert bound == pytest.approx(error, rel=1e-5, abs=1e-12 / (1 - gamma))
 
@@ -634,10 +632,8 @@ def test_numbers_of_every_kind_are_numbers(gamma):
         value_iteration(mdp, gamma=gamma).Q.tolist() == value_iteration(mdp, gamma=exact).Q.tolist()
     )
     assert (
-        q_value_iteration(
-            mdp, gamma=gamma, threshold=Fraction(1, 1000), max_sweeps=np.uint8(200)
-        ).V.tolist()
-        == q_value_iteration(mdp, gamma=exact, threshold=0.001, max_sweeps=200).V.tolist()
+        q_value_iteration(mdp, gamma=gamma, threshold=Fraction(1, 1000)).V.tolist()
+        == q_value_iteration(mdp, gamma=exact, threshold=0.001).V.tolist()
     )
     assert greedy_policy([[Fraction(1, 3), Fraction(1, 2)]]).tolist() == [1]
 
@@ -654,7 +650,7 @@ ODD = st.sampled_from(
 CALLS = {
     "q_value_iteration": (
         q_value_iteration,
-        {"mdp", "gamma", "threshold", "max_sweeps", "progress"},
+        {"mdp", "gamma", "threshold", "progress"},
     ),
     "value_iteration": (value_iteration, {"mdp", "gamma", "tolerance", "progress"}),
     "policy_iteration": (
@@ -712,8 +708,6 @@ def test_gamma_out_of_range(planner, gamma):
         (lambda m: value_iteration(m, gamma=0.9, tolerance=np.inf), ValueError, "tolerance .* inf"),
         (lambda m: value_iteration(m, gamma=0.9, tolerance=None), TypeError, "tolerance must be a"),
         (lambda m: q_value_iteration(m, gamma=0.9, threshold=-1), ValueError, "threshold .* -1"),
-        (lambda m: q_value_iteration(m, gamma=0.9, max_sweeps=0), ValueError, "max_sweeps .* 0"),
-        (lambda m: q_value_iteration(m, gamma=0.9, max_sweeps=2.5), TypeError, "max_sweeps must"),
         (
             lambda m: policy_iteration(m, gamma=0.9, evaluation_threshold=0),
             ValueError,

@@ -14,11 +14,8 @@ from scipy import stats
 
 from rl_core.statistics import (
     bootstrap_interval,
-    episodes_to_threshold,
     iqm,
     learned,
-    learning_curves,
-    paired_difference_interval,
     probability_of_improvement,
     proportion_interval,
 )
@@ -271,10 +268,8 @@ def test_numbers_of_any_type_are_the_same_numbers(kind):
         assert iqm(given) == iqm(plain)
     numbers_of_kind = (np.asarray(plain, kind).tolist(), pd.Series(plain).astype(kind))
     for arm in (given, *numbers_of_kind):
-        found = paired_difference_interval(arm, [0, 1, 0, 0, 0], np.mean, rng=generator())
-        assert found.estimate == pytest.approx(0.4)
+        assert bootstrap_interval(arm, np.mean, rng=generator()).estimate == pytest.approx(0.6)
     assert learned([given], np.float32(1), window=np.uint8(5)).tolist() == [True]
-    assert episodes_to_threshold([given], Fraction(0), hold=1).tolist() == [2]
 
 
 def test_fractions_take_integers_of_any_width():
@@ -284,34 +279,6 @@ def test_fractions_take_integers_of_any_width():
 
 
 # --- comparing arms -------------------------------------------------------------------------------
-
-
-def test_pairing_removes_what_the_seeds_share():
-    shared = generator(1).normal(0, 100, size=30)
-    a, b = shared + 5 + generator(2).normal(size=30), shared
-    interval = paired_difference_interval(a, b, np.mean, rng=generator())
-    assert interval == bootstrap_interval(a - b, np.mean, rng=generator())
-    assert 4 < interval.low < interval.estimate < interval.high < 6
-
-
-def test_differences_refuse_what_cannot_be_subtracted():
-    with pytest.raises(ValueError, match=r"b must be of the shape of a, \(2,\), got \(3,\)"):
-        paired_difference_interval([1.0, 2.0], [1.0, 2.0, 3.0], rng=generator())
-    with pytest.raises(ValueError, match=r"statistic must be np\.median where a or b is infinite"):
-        paired_difference_interval([1.0, np.inf], [1.0, np.inf], np.mean, rng=generator())
-
-
-def test_a_seed_that_never_gets_there_has_an_infinite_difference_unless_neither_does():
-    a, b = [np.inf, np.inf, 5.0, 7.0, 9.0], [np.inf, 3.0, np.inf, 6.0, 6.0]
-    interval = paired_difference_interval(a, b, rng=generator())
-    assert interval == bootstrap_interval([0, np.inf, -np.inf, 1, 3], rng=generator())
-    assert interval == (1, -np.inf, np.inf)
-
-
-def test_half_the_seeds_better_and_half_worse_without_end_is_no_difference():
-    assert paired_difference_interval([np.inf, 1], [2, np.inf], rng=generator()) == (
-        *(0, -np.inf, np.inf),
-    )
 
 
 def test_probability_of_improvement_is_the_mann_whitney_statistic():
@@ -389,111 +356,6 @@ def test_fractions_refuse(successes, trials, level, message):
         proportion_interval(successes, trials, level=level)
 
 
-# --- learning curves ------------------------------------------------------------------------------
-
-
-def episodes_table(steps_by_seed):
-    rows = [
-        (seed, episode, float(steps))
-        for seed, column in steps_by_seed.items()
-        for episode, steps in enumerate(column, start=1)
-    ]
-    return pd.DataFrame(rows, columns=["seed", "episode", "steps"])
-
-
-def test_curves_are_aligned_by_seed_and_end_where_the_seed_stopped():
-    table = episodes_table({3: [30, 10, 20, 40], 8: [7, 5]}).sample(frac=1, random_state=0)
-    curves = learning_curves(table, seeds=[8, 1, 3], episodes=5, window=3)
-    nan = np.nan
-    np.testing.assert_array_equal(curves, [[7, 6, nan, nan, nan], [nan] * 5, [30, 20, 20, 20, nan]])
-    means = learning_curves(table, seeds=[3, 8], episodes=4, window=2, average="mean")
-    np.testing.assert_allclose(means[0], [30, 20, 15, 30])
-
-
-@quick
-@given(
-    hnp.arrays(np.float64, st.tuples(st.integers(1, 4), st.integers(1, 12)), elements=numbers),
-    st.integers(1, 15),
-    st.sampled_from(["median", "mean"]),
-)
-def test_curves_are_trailing_averages(steps, window, average):
-    table = episodes_table(dict(enumerate(steps)))
-    n_seeds, n_episodes = steps.shape
-    curves = learning_curves(
-        table, seeds=range(n_seeds), episodes=n_episodes, window=window, average=average
-    )
-    for t in range(n_episodes):
-        part = steps[:, max(0, t + 1 - window) : t + 1]
-        np.testing.assert_allclose(
-            curves[:, t], getattr(np, average)(part, axis=1), rtol=1e-9, atol=1e-6
-        )
-
-
-def test_curves_keep_infinities():
-    table = episodes_table({0: [1, 2, np.inf, 4, 5, 6, 7], 1: [np.inf, 3, np.inf]})
-    nan, inf = np.nan, np.inf
-    shape = {"seeds": [0, 1], "episodes": 7, "window": 3}
-    np.testing.assert_array_equal(
-        learning_curves(table, **shape),
-        [[1, 1.5, 2, 4, 5, 5, 6], [inf, inf, inf, nan, nan, nan, nan]],
-    )
-    np.testing.assert_array_equal(
-        learning_curves(table, average="mean", **shape),
-        [[1, 1.5, inf, inf, inf, 5, 6], [inf, inf, inf, nan, nan, nan, nan]],
-    )
-
-
-@quick
-@given(
-    hnp.arrays(
-        np.float64,
-        st.tuples(st.integers(1, 3), st.integers(1, 9)),
-        elements=st.one_of(numbers, st.just(np.inf)),
-    ),
-    st.integers(1, 10),
-    st.sampled_from(["median", "mean"]),
-)
-def test_curves_with_infinities_are_trailing_averages(steps, window, average):
-    curves = learning_curves(
-        episodes_table(dict(enumerate(steps))),
-        **{"seeds": range(len(steps)), "episodes": steps.shape[1]},
-        **{"window": window, "average": average},
-    )
-    for t in range(steps.shape[1]):
-        part = steps[:, max(0, t + 1 - window) : t + 1]
-        np.testing.assert_allclose(
-            curves[:, t], getattr(np, average)(part, axis=1), rtol=1e-9, atol=1e-6
-        )
-
-
-def test_an_arm_without_rows_has_empty_curves():
-    nothing = learning_curves(episodes_table({0: [1]})[:0], seeds=[0, 1], episodes=2)
-    np.testing.assert_array_equal(nothing, np.full((2, 2), np.nan))
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (
-            {"column": "reward"},
-            r"table must be with the columns \['reward'\] too, where .*, got \['seed'",
-        ),
-        ({"window": 0}, "window must be an integer from 1, got 0"),
-        ({"average": "max"}, "average must be one of 'median', 'mean', got 'max'"),
-        ({"seeds": [1]}, r"seeds must be all that the table has, \[0\] too"),
-        ({"seeds": [0, 1, 1]}, "seeds must be"),
-        ({"episodes": 2}, "episodes must be 1 to the last of the table, which has 1 to 3, got 2"),
-        ({"table": pd.concat([episodes_table({0: [1]})] * 2)}, "table must be of a single arm"),
-        ({"table": episodes_table({0: [1, math.nan]})}, r"steps must be without NaN, at \(1,\)"),
-        ({"table": episodes_table({0: [math.inf, -math.inf]}), "window": 2}, "steps .*both signs"),
-    ],
-)
-def test_curves_refuse(change, message):
-    arguments = {"table": episodes_table({0: [1, 2, 3], 1: [1]}), "seeds": [0, 1], "episodes": 3}
-    with pytest.raises(ValueError, match=message):
-        learning_curves(**(arguments | change))
-
-
 def test_learned_looks_at_the_median_of_the_last_episodes():
     curves = np.full((5, 10), 500.0)
     curves[0, -4:] = 100  # all of the window
@@ -506,40 +368,13 @@ def test_learned_looks_at_the_median_of_the_last_episodes():
     assert learned([[-np.inf, np.inf]], 100, window=2).tolist() == [False]  # no number at all
 
 
-def test_episodes_to_threshold_needs_the_curve_to_hold():
-    curves = [[9, 3, 9, 3, 3, 3, 9], [3, 3, 3, 3, 3, 3, 3], [9, 9, 9, 9, 9, 3, 3]]
-    assert episodes_to_threshold(curves, 3).tolist() == [2, 1, 6]
-    assert episodes_to_threshold(curves, 3, hold=3).tolist() == [4, 1, math.inf]
-    assert episodes_to_threshold([[np.nan, 2, np.nan]], 3, hold=2).tolist() == [math.inf]
-
-
-@quick
-@given(
-    hnp.arrays(np.float64, (3, 12), elements=st.integers(0, 9).map(float)),
-    st.integers(0, 9),
-    st.integers(1, 12),
-)
-def test_episodes_to_threshold_is_the_first_that_holds(curves, threshold, hold):
-    found = episodes_to_threshold(curves, threshold, hold=hold)
-    for curve, first in zip(curves, found, strict=True):
-        holds = [
-            episode
-            for episode in range(1, 14 - hold)
-            if all(curve[episode - 1 : episode - 1 + hold] <= threshold)
-        ]
-        assert first == min(holds, default=math.inf)
-
-
-@pytest.mark.parametrize(
-    ("function", "arguments"), [(learned, {"window": 5}), (episodes_to_threshold, {"hold": 0})]
-)
-def test_criteria_refuse(function, arguments):
-    with pytest.raises(ValueError, match=r"(window|hold) must be an integer from 1 to 4, got"):
-        function(np.zeros((2, 4)), 1.0, **arguments)
+def test_learned_refuses():
+    with pytest.raises(ValueError, match=r"window must be an integer from 1 to 4, got"):
+        learned(np.zeros((2, 4)), 1.0, window=5)
     with pytest.raises(ValueError, match=r"curves must be .*, got \(4,\)"):
-        function(np.zeros(4), 1.0, **arguments)
+        learned(np.zeros(4), 1.0, window=5)
     with pytest.raises(ValueError, match="threshold must be without NaN"):
-        function(np.zeros((2, 8)), math.nan, **dict.fromkeys(arguments, 1))
+        learned(np.zeros((2, 8)), math.nan, window=1)
 
 
 @pytest.mark.parametrize("seeds", [3, 7, 29, 30])

@@ -19,26 +19,22 @@ COLUMNS = {
 def walk(training):
     """Episodes of random lengths; what is learned is their number and a draw."""
     rng = spawn_streams(training.seed).policy
-    training.keep("initial/", {"w": np.zeros(2), "n": np.array(0)})
-    episode = 0
-    for episode in training.course(max_env_steps=None):
+    weights = {"w": np.zeros(2), "n": np.array(0)}
+    for episode in training.course(None, lambda: weights):
         steps = int(rng.integers(1, 50))
         training.add(steps, -float(steps), steps < 25)
-        if training.wants(episode):
-            training.keep(f"episode{episode}/", {"w": rng.random(2), "n": np.array(episode)})
-    training.keep("", {"w": rng.random(2), "n": np.array(episode)})
+        weights["w"][:], weights["n"] = rng.random(2), np.array(episode)
 
 
 def stopping(at, reason="tired"):
     """Fails in episode `at` of seed 1."""
 
     def train(training):
-        for episode in training.course(max_env_steps=None):
+        for episode in training.course(None, lambda: {"w": np.array(training.seed)}):
             training.add(3, 1.0, True)
             if (training.seed, episode) == (1, at):
                 training.fail(reason)
                 training.fail("only the first reason counts")
-        training.keep("", {"w": np.array(training.seed)})
 
     return train
 
@@ -86,11 +82,12 @@ def test_arrays_are_named_by_moment_and_stacked_by_seed():
 
 
 def test_what_is_kept_is_a_copy():
-    training = Training(0, 1, (), lambda episodes, steps: None)
-    weights = np.zeros(2)
-    training.keep("", {"w": weights})
+    training, weights = Training(0, 1, (), lambda episodes, steps: None), np.zeros(2)
+    for _ in training.course(None, lambda: {"w": weights}):
+        weights[:] += 1
+    assert training.kept["initial/"]["w"].tolist() == [0, 0]
     weights += 1
-    assert not training.kept[""]["w"].any()
+    assert training.kept[""]["w"].tolist() == [1, 1]
 
 
 # Ends
@@ -106,9 +103,8 @@ def test_a_failure_ends_its_seed_and_no_other():
 @pytest.mark.parametrize("total", [np.nan, np.inf, -np.inf])
 def test_a_return_that_is_not_finite_is_a_failure(total):
     def train(training):
-        for episode in training.course(max_env_steps=None):
+        for episode in training.course(None, dict):
             training.add(1, total if episode == 2 else 0.0, True)
-        training.keep("", {})
 
     run = train_seeds(train, episodes=9, seeds=[5])
     assert run.failures == (Failure(5, 2, f"the return is {total}"),)
@@ -117,20 +113,35 @@ def test_a_return_that_is_not_finite_is_a_failure(total):
 
 def test_a_snapshot_never_reached_is_the_last_moment():
     def train(training):
-        for episode in training.course(max_env_steps=25):
+        count = np.zeros(1)
+        for _ in training.course(25, lambda: {"n": count}):
             training.add(10, 0.0, True)
-            if training.wants(episode):
-                training.keep(f"episode{episode}/", {"n": np.array(episode)})
-        training.keep("", {"n": np.array(-1)})
+            count[:] += 1
 
     run = train_seeds(train, episodes=9, seeds=[0], snapshots=(2, 8))
     assert len(run.table) == 3
-    assert (run.arrays["episode2/n"].item(), run.arrays["episode8/n"].item()) == (2, -1)
+    assert (run.arrays["episode2/n"].item(), run.arrays["episode8/n"].item()) == (2, 3)
+
+
+def test_a_weight_that_is_not_finite_ends_the_seed():
+    def train(training):
+        weight = np.zeros(2)
+        for episode in training.course(None, lambda: {"w": weight}):
+            training.add(1, 0.0, True)
+            weight[1] = np.nan if episode == 3 else 0.0
+
+    run = train_seeds(train, episodes=9, seeds=[5])
+    assert run.failures == (Failure(5, 3, "a weight is not finite"),)
+
+
+def test_a_learner_that_does_not_go_through_the_course_is_refused():
+    with pytest.raises(ValueError, match=r"^train must be a function that goes through .*, got "):
+        train_seeds(lambda training: None, episodes=9, seeds=[5])
 
 
 def test_an_episode_stops_at_the_least_of_the_limits_and_of_what_is_left():
     training = Training(0, 9, (), lambda episodes, steps: None)
-    for episode in training.course(max_env_steps=25):
+    for episode in training.course(25, dict):
         assert training.max_steps(None) == 25 - training.env_steps
         assert training.max_steps(7, None) == min(7, 25 - training.env_steps)
         training.add(10 if episode < 3 else training.max_steps(None), 0.0, False)

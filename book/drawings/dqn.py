@@ -23,13 +23,13 @@ from drawings.look import (
     median_band,
 )
 from drawings.reinforce import films
-from rl_core.evaluation import Rollout, Weights, of_values
+from rl_core.evaluation import Rollout, Weights
 from rl_core.experiments import Results
 from rl_core.training import weights_of
 from studies import dqn as study
 from studies.dqn import BUDGET, ENV, EPISODES, LEARNED, PARTS, Curves
 from studies.policy_maps import action_values
-from studies.shared import shown_agents
+from studies.shared import of_values, shown_agents
 
 PUSHES = ("left", "none", "right")
 _PUSH_COLOURS = ListedColormap([SKY_BLUE, "#eeeeee", ORANGE])

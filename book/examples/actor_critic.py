@@ -15,10 +15,10 @@ import numpy as np
 import torch
 
 from rl_core.checks import fields, instance, integer, number, optional, positive, require
-from rl_core.modules import as_arrays, load_arrays, make_module, reproducible
+from rl_core.modules import as_arrays, load_arrays, make_module, train_networks
 from rl_core.policies import MLP, Categorical, Network, make_policy
-from rl_core.training import spawn_streams, train_seeds
-from rl_core.worlds.environments import one_seed_of, open_world, step
+from rl_core.training import spawn_streams
+from rl_core.worlds.environments import open_world, step
 from rl_core.worlds.episodes import ModuleActor
 
 
@@ -63,8 +63,7 @@ def _train(world, config, training):
     policy, value = networks["policy"], networks["value"]
     rates = [(policy, config.policy_rate), (value, config.value_rate)]
     optimiser = torch.optim.SGD([{"params": net.parameters(), "lr": rate} for net, rate in rates])
-    training.keep("initial/", as_arrays(networks))
-    for episode in training.course(config.max_env_steps):
+    for _ in training.course(config.max_env_steps, lambda: as_arrays(networks)):
         max_steps = training.max_steps(config.max_episode_steps, world.max_episode_steps)
         state = torch.from_numpy(world.reset())
         steps, total, discount, terminated, truncated = 0, 0.0, 1.0, False, False
@@ -83,11 +82,6 @@ def _train(world, config, training):
             state, discount = following, config.gamma * discount
             steps, total = steps + 1, total + reward
         training.add(steps, total, terminated)
-        if not all(parameter.isfinite().all() for parameter in networks.parameters()):
-            training.fail("a weight is not finite after learning")
-        if training.wants(episode):
-            training.keep(f"episode{episode}/", as_arrays(networks))
-    training.keep("", as_arrays(networks))
 
 
 def check_actor_critic(env, config):
@@ -100,11 +94,5 @@ def check_actor_critic(env, config):
 def actor_critic(env, config, *, episodes, seeds, snapshots=(), progress=None):
     """Train a policy and a value a seed; arguments and result are those of `reinforce`."""
     check_actor_critic(env, config)
-
-    def train(training):
-        with closing(open_world(env)) as world, reproducible(training.seed):
-            _train(world, config, training)
-
     arguments = {"episodes": episodes, "snapshots": snapshots, "progress": progress}
-    seeds = one_seed_of(env, seeds)
-    return train_seeds(train, seeds=seeds, env=env, config=config, **arguments)
+    return train_networks(_train, env, config, seeds=seeds, **arguments)

@@ -27,12 +27,11 @@ from rl_core.reinforce import ReinforceConfig, reinforce
 from rl_core.statistics import (
     Interval,
     bootstrap_interval,
-    episodes_to_threshold,
     learned,
-    learning_curves,
     proportion_interval,
 )
 from studies import shared
+from studies.curves import episodes_to_threshold, learning_curves
 from studies.shared import interval_text, lower_evidence, median_evidence
 
 ENV = "MountainCarContinuous-v0"

@@ -18,21 +18,16 @@ import pandas as pd
 from report.claims import Claim, Criterion, Evidence, Finding, sensitivity
 from report.seeds import SEEDS
 from rl_core.dqn import DQNConfig, dqn
-from rl_core.evaluation import evaluate, of_values
+from rl_core.evaluation import evaluate
 from rl_core.experiments import Arm, Results, run
 from rl_core.exploration import Linear
 from rl_core.policies import MLP
-from rl_core.statistics import (
-    bootstrap_interval,
-    episodes_to_threshold,
-    learned,
-    learning_curves,
-    proportion_interval,
-)
+from rl_core.statistics import bootstrap_interval, learned, proportion_interval
 from rl_core.training import weights_of
 from rl_core.worlds.shaping import Shaping
 from studies import shared
-from studies.shared import interval_text, lower_evidence, median_evidence
+from studies.curves import episodes_to_threshold, learning_curves
+from studies.shared import interval_text, lower_evidence, median_evidence, of_values
 
 EPISODES = 100  # of figures 12 and 13
 BUDGET = {"Acrobot": 25_000, "MountainCar": 45_000}  # environment steps a seed, for the causes

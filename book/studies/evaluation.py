@@ -17,7 +17,7 @@ from scipy.stats import kendalltau
 from report.claims import Claim, Criterion, Evidence, Finding, Reading
 from report.seeds import SEEDS
 from rl_core.dqn import dqn
-from rl_core.evaluation import Agent, as_learned, evaluate, greedy, of_table, of_values
+from rl_core.evaluation import Agent, Measure, as_learned, evaluate, greedy
 from rl_core.experiments import Arm, Results, run
 from rl_core.exploration import EpsilonGreedy, Linear, Trials
 from rl_core.q_learning import QLearningConfig, q_learning
@@ -28,6 +28,7 @@ from studies import continuous as continuous_study
 from studies import dqn as dqn_study
 from studies import reinforce as reinforce_study
 from studies.fastest import Fastest, fastest
+from studies.shared import of_table, of_values
 
 ENV = {
     "Acrobot": "Acrobot-v1",
@@ -219,9 +220,28 @@ def shaped_return(name: str) -> Callable[..., float]:
     return distance_from_start
 
 
+def evaluate_both(
+    env: str, agent: Agent, limit: int, *, seed: int, measures: Mapping[str, Measure] | None = None
+) -> pd.DataFrame:
+    """Evaluate an agent without limit, and the same episodes as if a limit had cut them off.
+
+    What they would have been then: `limited_steps`, `limited_return`, `limited_terminated`.
+    """
+
+    def limited_return(observations, actions, rewards):
+        return rewards[:limit].sum()
+
+    measures = {**(measures or {}), "limited_return": limited_return}
+    rules = {"seed": seed, "episodes": EPISODES, "max_steps": CAP, "measures": measures}
+    table = evaluate(env, agent, **rules)
+    table["limited_steps"] = table["steps"].clip(upper=limit)
+    table["limited_terminated"] = table["terminated"] & (table["steps"] <= limit)
+    return table
+
+
 def try_out(one: Tried, results: Results) -> pd.DataFrame:
     """Evaluate an agent with every seed: one row an episode."""
-    rules = {"episodes": EPISODES, "max_steps": CAP, "limit": LIMIT[one.environment]}
+    limit = LIMIT[one.environment]
     levels = LEVELS[one.environment]
     env = ENV[one.environment]
     tables = []
@@ -231,14 +251,14 @@ def try_out(one: Tried, results: Results) -> pd.DataFrame:
         Q = None if one.arm is None else results.arrays(one.arm)["Q"]
         for i, seed in enumerate(SEEDS):
             values = np.zeros(world.shape) if Q is None else Q[i]
-            tables.append(evaluate(env, of_table(world, values), seed=seed, **rules))
+            tables.append(evaluate_both(env, of_table(world, values), limit, seed=seed))
     else:
         arrays = results.arrays(one.arm)
         config = next(arm.config for arm in arms() if arm.name == one.arm)
         measures = {"shaped_return": shaped_return(one.environment)}
         for i, seed in enumerate(SEEDS):
             agent = make_agent(one, config, weights_of(arrays, i))
-            tables.append(evaluate(env, agent, seed=seed, measures=measures, **rules))
+            tables.append(evaluate_both(env, agent, limit, seed=seed, measures=measures))
     table = pd.concat(tables, keys=SEEDS, names=["seed"]).reset_index(level="seed")
     for column in ("environment", "agent", "trained", "acting"):
         table.insert(0, column, getattr(one, column))
@@ -272,8 +292,8 @@ def dqn_as_trained(results: Results, policies: pd.DataFrame) -> pd.DataFrame:
         arrays = results.arrays(f"{name}, DQN")
         for i, seed in enumerate(SEEDS):
             agent = of_values(weights_of(arrays, i), TRAINED_EPSILON)
-            rules = {"episodes": EPISODES, "max_steps": CAP, "limit": LIMIT[name]}
-            played = evaluate(ENV[name], agent, seed=seed, **rules).assign(shaped_return=np.nan)
+            played = evaluate_both(ENV[name], agent, LIMIT[name], seed=seed)
+            played = played.assign(shaped_return=np.nan)
             who = dict(zip(KEY, (name, "DQN", "no limit", "as trained"), strict=True))
             tables.append(played.assign(**who, seed=seed))
     greedily = (policies["agent"] == "DQN") & (policies["trained"] == "no limit")

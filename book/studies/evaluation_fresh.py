@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from report.seeds import FULL, SEEDS
-from rl_core.evaluation import as_learned, evaluate, of_table
+from rl_core.evaluation import as_learned, evaluate
 from rl_core.experiments import Arm, Results, run
 from rl_core.q_learning import q_learning
 from rl_core.statistics import bootstrap_interval
@@ -24,7 +24,7 @@ from rl_core.training import weights_of
 from rl_core.worlds.discretise import gridded
 from studies import evaluation as first
 from studies import reinforce as reinforce_study
-from studies.shared import interval_text
+from studies.shared import interval_text, of_table
 
 NEAR_A_BOUND = range(100, 100 + 100 * len(SEEDS) // FULL)
 OF_ANGLES = NEAR_A_BOUND[len(SEEDS) :]

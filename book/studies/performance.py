@@ -14,9 +14,10 @@ from matplotlib.ticker import NullFormatter
 
 from drawings.look import BLACK, BLUE, GREY, label
 from report.seeds import PREVIEW
-from rl_core.maze import Maze, random_maze
+from rl_core.maze import Maze
 from rl_core.planning import value_iteration
 from rl_core.reinforce import ReinforceConfig, reinforce
+from studies.random_mazes import random_maze
 
 ROUNDS = 1 if PREVIEW else 3
 SEED_COUNTS = (1, 2, 4, 8, 16)

@@ -15,7 +15,7 @@ import pandas as pd
 from drawings.maze import Move
 from report.claims import Claim, Criterion, Evidence, Finding, Reading
 from report.seeds import SEEDS
-from rl_core.maze import ACTIONS, Maze, random_maze
+from rl_core.maze import ACTIONS, Maze
 from rl_core.mdp import MDP
 from rl_core.planning import (
     backup,
@@ -26,6 +26,7 @@ from rl_core.planning import (
     value_iteration,
 )
 from rl_core.statistics import bootstrap_interval
+from studies.random_mazes import random_maze
 
 GAMMA = 0.9
 THRESHOLD = 1e-5

@@ -13,8 +13,9 @@ from report.claims import Claim, Criterion, Evidence, Finding, Reading
 from report.seeds import SEEDS
 from rl_core.experiments import Arm, Results
 from rl_core.exploration import EpsilonGreedy, Linear, Softmax, UnnormalisedSoftmax, VisitDecay
-from rl_core.q_learning import QLearningConfig, q_learning_on_model
+from rl_core.q_learning import QLearningConfig
 from rl_core.statistics import bootstrap_interval
+from studies.on_model import q_learning_on_model
 from studies.q_learning_world import GAMMA, World
 
 EPISODES = 5_000

@@ -28,15 +28,9 @@ from report.seeds import FULL, SEEDS
 from rl_core.experiments import Arm, Results, run
 from rl_core.policies import MLP
 from rl_core.reinforce import ReinforceConfig, reinforce
-from rl_core.statistics import (
-    bootstrap_interval,
-    episodes_to_threshold,
-    learned,
-    learning_curves,
-    paired_difference_interval,
-    proportion_interval,
-)
+from rl_core.statistics import bootstrap_interval, learned, proportion_interval
 from studies import shared
+from studies.curves import episodes_to_threshold, learning_curves, paired_difference_interval
 from studies.shared import interval_text, lower_evidence, median_evidence
 
 EPISODES = 2_000

@@ -7,9 +7,13 @@ import pandas as pd
 
 from report.claims import Evidence
 from report.seeds import SEEDS
-from rl_core.evaluation import Agent
+from rl_core.dqn import DQNConfig
+from rl_core.evaluation import Agent, as_learned
 from rl_core.experiments import Results
+from rl_core.kernels.likelihood import Policy
 from rl_core.statistics import bootstrap_interval, probability_of_improvement
+from rl_core.worlds.discretise import GriddedTask
+from rl_core.worlds.episodes import TableActor
 
 
 def median_evidence(values: np.ndarray, rng: np.random.Generator) -> Evidence:
@@ -113,6 +117,38 @@ def fate_table(
     end = np.where(np.isinf(steps), np.nan, steps)
     names = {"seed": list(seeds), "fate": fates, "steps_at_end": end, "env_steps": used}
     return pd.DataFrame(names)
+
+
+def of_values(weights: Mapping[str, np.ndarray], epsilon: float = 0.0) -> Agent:
+    """The epsilon-greedy policy of a network that puts out one action value an action.
+
+    Examples
+    --------
+    >>> of_values({"layer0.weight": np.array([[1, 2]], np.float32)}).predict(np.ones(1))[0]
+    np.int64(1)
+    """
+    return as_learned(DQNConfig(epsilon=epsilon), weights)
+
+
+def of_table(world: GriddedTask, Q: np.ndarray) -> Agent:
+    """The greedy policy of a table over the cells of a gridded task.
+
+    Parameters
+    ----------
+    world : GriddedTask
+    Q : float64 array of shape `world.shape`
+        Of several largest values, one is drawn.
+
+    Examples
+    --------
+    >>> from rl_core.worlds.discretise import gridded
+    >>> world = gridded("MountainCar-v0", 10)
+    >>> of_table(world, np.zeros(world.shape)).actor.policy.sizes
+    array([2, 3])
+    """
+    sizes = np.array([len(world.grid.bins), len(world.actions)])
+    policy = Policy(sizes, False, False, False, world.actions.shape[1])
+    return Agent(TableActor(policy, world.grid, Q, world.actions, 0.0, np.empty(2)))
 
 
 def interval_text(interval: tuple[float, float, float]) -> str:
