@@ -105,6 +105,28 @@ def test_what_was_executed_is_not_executed_again(root):
     )
 
 
+@pytest.fixture
+def steps(root, monkeypatch):
+    """What a build runs, without running it."""
+    done = []
+    monkeypatch.setattr(build, "run", lambda command, _folder=None: done.append(command[2]) or 0)
+    monkeypatch.setattr(build, "execute_all", lambda paths: done.append(len(paths)) or 0)
+    monkeypatch.setattr(build.pictures, "missing", lambda *_: [])
+    for name in ("01_x", "intro"):
+        (root / f"book/{name}.ipynb").write_text("{}")
+    return done
+
+
+def test_the_book_is_trained_then_executed_then_set(root, steps):
+    assert build.build(30, []) == 0
+    assert steps == ["studies.everything", 2, str(root / "_build/source")]
+
+
+def test_a_chapter_alone_trains_itself(root, steps):
+    assert build.build(30, ["01_x"]) == 0
+    assert steps == [1, str(root / "_build/chapter/_build/source")]
+
+
 @pytest.mark.parametrize(("seeds", "only", "offered"), [("30", [], True), ("3", [], False)])
 def test_an_interrupted_build_offers_the_preview(monkeypatch, capsys, seeds, only, offered):
     def interrupted(*_):

@@ -112,11 +112,7 @@ def build(seeds: int, only: list[str]) -> int:
         announce(seeds)
         notebooks = list((source / "book").glob("*.ipynb"))
         page += STRICT
-    code = (
-        (not only and run(train, cwd=source / "book"))
-        or execute_all(notebooks)
-        or run(page, cwd=ROOT)
-    )
+    code = (not only and run(train, source / "book")) or execute_all(notebooks) or run(page)
     lost = [] if code else pictures.missing(source / "book", target / "_build" / "html" / "book")
     print("\n".join(lost), file=sys.stderr)
     if only and not code:
