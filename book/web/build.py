@@ -64,14 +64,11 @@ def stages(notebooks: Iterable[Path]) -> list[list[Path]]:
     return [chapters, *([path] for path in paths if path not in chapters)]
 
 
-def execute(notebook: Path) -> int:
-    """Execute a notebook where it lies and write the outputs into it; return an exit code."""
-    program = "from nbclient.cli import main; main()"  # jupyter execute, of this Python
+def execute(notebook: Path) -> subprocess.CompletedProcess[str]:
+    """Execute a notebook where it lies and write the outputs into it, as `jupyter execute` does."""
+    program = "from nbclient.cli import main; main()"  # of this Python
     command = [sys.executable, "-c", program, "--inplace", "--kernel_name=python3", "--timeout=-1"]
-    done = subprocess.run([*command, str(notebook)], capture_output=True, text=True, check=False)
-    if done.returncode > 0:
-        print(f"{notebook.name}:\n{done.stderr}", file=sys.stderr, flush=True)
-    return done.returncode
+    return subprocess.run([*command, str(notebook)], capture_output=True, text=True, check=False)
 
 
 def execute_all(notebooks: Iterable[Path]) -> int:
@@ -85,11 +82,12 @@ def execute_all(notebooks: Iterable[Path]) -> int:
             for stage in ordered:
                 futures = {pool.submit(execute, path): path for path in stage}
                 for future in as_completed(futures):
-                    if future.result():
-                        return future.result()
+                    name, done = futures[future].name, future.result()
+                    if done.returncode:
+                        print(f"{name}:\n{done.stderr}", file=sys.stderr, flush=True)
+                        return done.returncode
                     count += 1
-                    passed = (time.monotonic() - start) / 60
-                    name, total = futures[future].name, sum(map(len, ordered))
+                    passed, total = (time.monotonic() - start) / 60, sum(map(len, ordered))
                     print(f"--- {name}, {count} of {total}, after {passed:.1f} min", flush=True)
         finally:
             pool.shutdown(cancel_futures=True)
