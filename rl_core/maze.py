@@ -55,8 +55,8 @@ class Maze(OwnModel, gym.Env[int, int]):
         through another goal. Flags need not be.
     slip : float
         Probability of slipping, in [0, 1].
-    render_mode : {None, "ansi", "rgb_array"}
-        What `render` returns: nothing, a text, or a picture (uint8, shape (height, width, 3)).
+    render_mode : {None, "rgb_array"}
+        What `render` returns: nothing, or a picture (uint8, shape (height, width, 3)).
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class Maze(OwnModel, gym.Env[int, int]):
     """
 
     # Typed as in gymnasium.Env, which ClassVar would contradict.
-    metadata: dict[str, Any] = {"render_modes": ["ansi", "rgb_array"], "render_fps": 4}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 4}  # noqa: RUF012
 
     def __init__(
         self,
@@ -285,10 +285,7 @@ class Maze(OwnModel, gym.Env[int, int]):
         return row, column, self._flags_held(flag_set)
 
     def render(self) -> Any:
-        """Return the current state as text or picture, according to `render_mode`.
-
-        The text is the layout with the agent as `@` and flags held as `f`, and a line naming them.
-        The picture is that of `rl_core.worlds.maze_picture.draw_maze`.
+        """Return a picture of the current state (`rl_core.worlds.maze_picture.draw_maze`).
 
         Raises
         ------
@@ -298,12 +295,9 @@ class Maze(OwnModel, gym.Env[int, int]):
         Examples
         --------
         >>> from rl_core.maze import Maze
-        >>> env = Maze("SFG", render_mode="ansi")
-        >>> env.reset()[0]
-        0
-        >>> print(env.render(), end="")
-        @ F G
-        flags held: none
+        >>> env = Maze("SFG", render_mode="rgb_array")
+        >>> env.reset()[0], env.render().shape
+        (0, (96, 288, 3))
         """
         if self.render_mode is None:
             gym.logger.warn("render() needs a render_mode: gymnasium.make(id, render_mode=...)")
@@ -311,17 +305,7 @@ class Maze(OwnModel, gym.Env[int, int]):
         if self._state is None:
             raise ResetNeeded("call reset() before render()")
         row, column, held = self.locate(self._state)
-        if self.render_mode == "rgb_array":
-            return draw_maze(
-                self.walls, self.start, self.goals, self.flag_cells, held, (row, column)
-            )
-        letters = [list(line) for line in self.layout.splitlines()]
-        for flag in held:
-            flag_row, flag_column = self.flag_cells[flag]
-            letters[flag_row][flag_column] = "f"
-        letters[row][column] = "@"
-        lines = [" ".join(line) for line in letters]
-        return "\n".join([*lines, f"flags held: {held or 'none'}", ""])
+        return draw_maze(self.layout.split(), self.flag_cells, held, (row, column))
 
     def _transitions(self) -> tuple[I32, F64]:
         """Return successors and rewards, of shape (cells, flag sets, actions, outcomes)."""

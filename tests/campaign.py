@@ -113,7 +113,7 @@ def lake() -> MDP:
 
 @cache
 def maze() -> Maze:
-    made = Maze(render_mode="ansi")
+    made = Maze(render_mode="rgb_array")
     made.reset(seed=0)
     return made
 

@@ -1,63 +1,42 @@
-"""A picture of a maze as an array of pixels, for frames of an animation.
-
-Shapes are given in units of a cell, which is the square [0, 1] × [0, 1], y downwards.
-"""
+"""A picture of a maze as an array of pixels, for frames of an animation."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from rl_core.kernels.arrays import Bools
-
-Cell = tuple[int, int]
-Colour = tuple[int, int, int]
-
-CELL_PIXELS = 96
-"""Side of a cell; less in mazes that would be wider or higher than `MAX_PIXELS`."""
-MAX_PIXELS = 1536
+CELL_PIXELS, MAX_PIXELS = 96, 1536
+"""Side of a cell; less in mazes that would be wider or higher than 1536 pixels."""
 
 # The palette of Okabe and Ito, which colour-blind readers can tell apart, and greys.
-BLUE = (0, 114, 178)
-SKY_BLUE = (86, 180, 233)
-GREEN = (0, 158, 115)
-VERMILLION = (213, 94, 0)
-YELLOW = (240, 228, 66)
-WHITE = (255, 255, 255)
-FLOOR = (246, 246, 246)
-POLE = (90, 90, 90)
-WALL = (60, 60, 60)
+GROUND = {"S": (86, 180, 233), "G": (0, 158, 115), "W": (60, 60, 60)}
+FLOOR, INK, BLUE, VERMILLION = (246, 246, 246), (90, 90, 90), (0, 114, 178), (213, 94, 0)
 
 
 def draw_maze(
-    walls: Bools,
-    start: Cell,
-    goals: Iterable[Cell],
-    flag_cells: Mapping[str, Cell],
+    rows: Sequence[str],
+    flag_cells: Mapping[str, tuple[int, int]],
     held: Collection[str],
-    agent: Cell,
+    agent: tuple[int, int],
 ) -> NDArray[np.uint8]:
     """Draw a maze and the agent in it.
 
-    Walls are dark squares, the start is a sky-blue frame, a goal a green target, a flag a
-    vermillion pennant, of which only the outline is left once it is held. The agent is a blue disc
-    with a yellow dot for each flag held. No meaning hangs on colour alone.
+    Walls are dark squares, start and goals are coloured ones with their letter, a flag is a
+    vermillion pennant, of which only the outline is left once it is held. The agent is a blue disc.
 
     Parameters
     ----------
-    walls : ndarray of bool, shape (rows, columns)
-        Where the walls are.
-    start, agent : tuple of int
-        Cells as (row, column).
-    goals : iterable of tuple of int
-        The goals' cells.
+    rows : sequence of str
+        The layout, a letter a cell.
     flag_cells : mapping of str to tuple of int
-        Each flag's cell.
+        Each flag's cell as (row, column).
     held : collection of str
         The flags held.
+    agent : tuple of int
+        The agent's cell.
 
     Returns
     -------
@@ -66,36 +45,24 @@ def draw_maze(
 
     Examples
     --------
-    >>> import numpy as np
     >>> from rl_core.worlds.maze_picture import draw_maze
-    >>> walls = np.zeros((1, 3), dtype=bool)
-    >>> picture = draw_maze(walls, (0, 0), [(0, 2)], {"A": (0, 1)}, held="", agent=(0, 0))
-    >>> picture.shape, picture.dtype
-    ((96, 288, 3), dtype('uint8'))
+    >>> draw_maze(["SFG"], {"A": (0, 1)}, held="", agent=(0, 0)).shape
+    (96, 288, 3)
     """
-    side = max(1, min(CELL_PIXELS, MAX_PIXELS // max(walls.shape)))
-    ground = np.where(walls[:, :, None], WALL, FLOOR).astype(np.uint8)
+    side = max(1, min(CELL_PIXELS, MAX_PIXELS // max(len(rows), len(rows[0]))))
+    ground = np.array([[GROUND.get(letter, FLOOR) for letter in row] for row in rows], np.uint8)
     image = Image.fromarray(ground.repeat(side, axis=0).repeat(side, axis=1))
     draw = ImageDraw.Draw(image)
 
-    def at(cell: Cell, *points: tuple[float, float]) -> list[tuple[float, float]]:
-        row, column = cell
-        return [((column + x) * side, (row + y) * side) for x, y in points]
+    def at(cell: tuple[int, int], *points: tuple[float, float]) -> list[tuple[float, float]]:
+        return [((cell[1] + x) * side, (cell[0] + y) * side) for x, y in points]
 
-    def disc(cell: Cell, x: float, y: float, radius: float, colour: Colour) -> None:
-        draw.ellipse(at(cell, (x - radius, y - radius), (x + radius, y + radius)), colour)
-
-    draw.rectangle(at(start, (0.06, 0.06), (0.94, 0.94)), outline=SKY_BLUE, width=1 + side // 16)
-    for goal in goals:
-        for radius, colour in ((0.40, GREEN), (0.28, WHITE), (0.16, GREEN)):
-            disc(goal, 0.5, 0.5, radius, colour)
+    for row, column in np.ndindex(len(rows), len(rows[0])):
+        if (letter := rows[row][column]) in "SG":
+            (middle,) = at((row, column), (0.5, 0.5))
+            draw.text(middle, letter, fill=FLOOR, anchor="mm", font_size=side / 2)
     for flag, cell in flag_cells.items():
-        draw.rectangle(at(cell, (0.27, 0.12), (0.33, 0.88)), POLE)
-        pennant = at(cell, (0.33, 0.13), (0.80, 0.31), (0.33, 0.49))
-        draw.polygon(pennant, FLOOR if flag in held else VERMILLION, outline=POLE)
-    for radius, colour in ((0.34, WHITE), (0.30, BLUE)):
-        disc(agent, 0.5, 0.5, radius, colour)
-    for i in range(len(held)):
-        down, right = divmod(i, 4)
-        disc(agent, 0.35 + 0.1 * right, 0.35 + 0.1 * down, 0.04, YELLOW)
+        pennant = at(cell, (0.3, 0.1), (0.8, 0.3), (0.3, 0.5), (0.3, 0.9))
+        draw.polygon(pennant, FLOOR if flag in held else VERMILLION, outline=INK)
+    draw.ellipse(at(agent, (0.2, 0.2), (0.8, 0.8)), BLUE, outline=FLOOR, width=1 + side // 32)
     return np.asarray(image)
