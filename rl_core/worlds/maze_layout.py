@@ -52,8 +52,19 @@ def read_layout(layout: str | Sequence[str]) -> NDArray[np.str_]:
     """
     rows = _rows(layout)
     letters = np.array(rows).view("U1").reshape(len(rows), -1)
-    _check_start_and_flags(letters)
-    _check_goals(letters)
+    starts, goals = find(letters, "S"), find(letters, "G")
+    places = " and ".join(f"at row {row}, column {column}" for row, column in starts[:2])
+    _require(len(starts) == 1, "with one start S", f"{len(starts)} {places}".rstrip())
+    n_flags = np.count_nonzero(letters == "F")
+    _require(n_flags <= MAX_FLAGS, f"with at most {MAX_FLAGS} flags F", str(n_flags))
+    _require(goals, "with a goal G", "none")
+    # Regions of cells joined by moves, but not through a goal, for there the episode ends. A slip
+    # does not matter: whatever its probability, some action leads in every direction.
+    region, _ = ndimage.label((letters != "W") & (letters != "G"))
+    reached = ndimage.binary_dilation(region == region[starts[0]])
+    for row, column in goals:
+        found = f"one that cannot be reached, at row {row}, column {column}"
+        _require(reached[row, column], "with goals that can be reached from the start", found)
     return letters
 
 
@@ -74,11 +85,8 @@ def _rows(layout: object) -> list[str]:
     if isinstance(layout, str):
         layout = layout.strip().splitlines()
     allowed = "a text or a sequence of texts, one a row"
-    lines = [
-        checks.instance("layout", line, str, allowed)
-        for line in checks.instance("layout", layout, Sequence, allowed)
-    ]
-    rows = ["".join(line.split()) for line in lines]
+    lines = checks.instance("layout", layout, Sequence, allowed)
+    rows = ["".join(checks.instance("layout", line, str, allowed).split()) for line in lines]
     checks.require(rows and rows[0], "layout", layout, "at least one row with at least one letter")
     for number, row in enumerate(rows):
         found = f"{len(row)} letters in row {number}, {len(rows[0])} in row 0"
@@ -92,27 +100,3 @@ def _rows(layout: object) -> list[str]:
 def _require(condition: object, allowed: str, found: str) -> None:
     if not condition:
         raise ValueError(f"layout must be {allowed}, got {found}")
-
-
-def _check_start_and_flags(letters: NDArray[np.str_]) -> None:
-    starts = find(letters, "S")
-    places = " and ".join(f"at row {row}, column {column}" for row, column in starts[:2])
-    _require(len(starts) == 1, "with one start S", f"{len(starts)} {places}".rstrip())
-    n_flags = len(find(letters, "F"))
-    _require(n_flags <= MAX_FLAGS, f"with at most {MAX_FLAGS} flags F", str(n_flags))
-
-
-def _check_goals(letters: NDArray[np.str_]) -> None:
-    """Check that there are goals and that each can be reached.
-
-    A slip does not matter here: whatever its probability, some action leads in every direction.
-    """
-    goals = find(letters, "G")
-    _require(goals, "with a goal G", "none")
-    # Regions of cells joined by moves, but not through a goal, for there the episode ends.
-    region, _ = ndimage.label((letters != "W") & (letters != "G"))
-    (start,) = find(letters, "S")
-    reached = ndimage.binary_dilation(region == region[start])
-    for row, column in goals:
-        found = f"one that cannot be reached, at row {row}, column {column}"
-        _require(reached[row, column], "with goals that can be reached from the start", found)
