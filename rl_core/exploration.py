@@ -291,11 +291,7 @@ class UnnormalisedSoftmax:
     """
 
     kind: ClassVar[int] = UNNORMALISED_SOFTMAX
-
-    @property
-    def parameter(self) -> float | Linear:
-        """Not used."""
-        return 1.0
+    parameter: ClassVar[float] = 1.0  # not used
 
 
 ExplorationRule = EpsilonGreedy | Softmax | UnnormalisedSoftmax

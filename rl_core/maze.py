@@ -18,8 +18,7 @@ from gymnasium.error import ResetNeeded
 from rl_core import checks
 from rl_core.kernels.arrays import F64, I32, Bools
 from rl_core.mdp import MDP, OwnModel
-from rl_core.worlds.maze_layout import COURSE_LAYOUT, find, read_layout
-from rl_core.worlds.maze_picture import draw_maze
+from rl_core.worlds.maze_layout import COURSE_LAYOUT, draw_maze, find, read_layout
 
 ACTIONS = ("up", "down", "left", "right")
 MOVES = ((-1, 0), (1, 0), (0, -1), (0, 1))
@@ -285,7 +284,7 @@ class Maze(OwnModel, gym.Env[int, int]):
         return row, column, self._flags_held(flag_set)
 
     def render(self) -> Any:
-        """Return a picture of the current state (`rl_core.worlds.maze_picture.draw_maze`).
+        """Return a picture of the current state (`rl_core.worlds.maze_layout.draw_maze`).
 
         Raises
         ------

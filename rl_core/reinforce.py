@@ -243,12 +243,11 @@ def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator)
     hidden = config.network.hidden if isinstance(config.network, MLP) else ()
     spaces = world.n_observations, world.n_actions, world.action_dimensions
     policy = policies.make_policy(config.policy, hidden, *spaces)
-    n_sigmas = policy.action_width if policy.gaussian else 0
+    sigmas = policies.initial_log_sigma(policy, config.policy)
     if not isinstance(config.network, MLP):
         n_inputs, n_outputs = policy.sizes.tolist()
         module = modules.make_module(config.network, n_inputs, n_outputs, rng)
-        start = math.log(config.policy.sigma) if isinstance(config.policy, Gaussian) else 0.0
-        log_sigma = _log_sigma(config, torch.full((n_sigmas,), start))
+        log_sigma = _log_sigma(config, sigmas)
         learner = TorchLearner(policy, module, log_sigma, config)
 
         def by_name() -> Arrays:
@@ -266,9 +265,9 @@ def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator)
 
     learn: Callable[..., None]
     if config.engine == "torch":
-        vector = torch.from_numpy(parameters)  # actor and module share its memory
+        # Actor and module share the memory of the parameters.
         module = modules.perceptron(policy.sizes.tolist(), parameters, biases)
-        log_sigma = _log_sigma(config, vector[len(vector) - n_sigmas :])
+        log_sigma = _log_sigma(config, parameters[len(parameters) - len(sigmas) :])
         learn = TorchLearner(policy, module, log_sigma, config).learn
     else:
         learns = policies.trainable(policy, config.policy, biases)
@@ -279,9 +278,9 @@ def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator)
     return _Agent(likelihood.make_actor(policy, parameters), learn, layers)
 
 
-def _log_sigma(config: ReinforceConfig, start: torch.Tensor) -> torch.nn.Parameter:
+def _log_sigma(config: ReinforceConfig, start: F32) -> torch.nn.Parameter:
     learns = isinstance(config.policy, Gaussian) and config.policy.learn_sigma
-    return torch.nn.Parameter(start, requires_grad=learns)
+    return torch.nn.Parameter(torch.from_numpy(start), requires_grad=learns)
 
 
 def _orders(config: ReinforceConfig, steps: int, rng: np.random.Generator) -> I64:
