@@ -390,46 +390,6 @@ def policy_evaluation(mdp: MDP, policy: ArrayLike, *, gamma: float) -> F64:
     return V
 
 
-def backup(mdp: MDP, V: ArrayLike, *, gamma: float) -> F64:
-    """Look one step ahead of V: return Q(s, a) = Σ_k p_k (r_k + γ V(s'_k)).
-
-    Parameters
-    ----------
-    mdp : MDP
-        The model.
-    V : array of float, shape (S,)
-        State values.
-    gamma : float
-        Discount, in [0, 1 - 1e-8].
-
-    Returns
-    -------
-    ndarray of float64, shape (S, A)
-        Action values.
-
-    Raises
-    ------
-    ValueError, TypeError
-        If an argument is out of range, not finite, or has the wrong shape or type.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from rl_core.mdp import MDP
-    >>> from rl_core.planning import backup
-    >>> lake = MDP.from_env("FrozenLake-v1")
-    >>> backup(lake, np.zeros(16), gamma=0.99)[14].round(3).tolist()
-    [0.0, 0.333, 0.333, 0.333]
-    """
-    gamma, transitions, reward = _opened(mdp, gamma)
-    values = checks.floats("V", V, (mdp.n_states,))
-    _largest(reward, gamma)
-    bounds.check_returns("V", _magnitude(values), 0.0)
-    Q = np.zeros((mdp.n_states, mdp.n_actions))
-    sweeps.lookahead(transitions, reward, gamma, values, Q)
-    return Q
-
-
 def greedy_policy(Q: ArrayLike) -> Ints:
     """Return the lowest of the best actions of each state.
 

@@ -207,7 +207,6 @@ CALLS: dict[str, Callable[[], dict[str, Any]]] = {
     "mdp.MDP.from_env": lambda: {"env": "FrozenLake-v1", "start_distribution": np.eye(16)[0]},
     "modules.load_arrays": lambda: {"module": torch.nn.Linear(1, 1),
                                     "arrays": {"weight": np.zeros((1, 1)), "bias": np.zeros(1)}},
-    "planning.backup": lambda: {"mdp": lake(), "V": np.zeros(16), "gamma": 0.9},
     "planning.greedy_policy": lambda: {"Q": np.zeros((3, 2))},
     "planning.optimal_actions": lambda: {"Q": np.zeros((3, 2)), "tolerance": 0.1},
     "planning.policy_evaluation": lambda: {"mdp": lake(), "policy": np.zeros(16, int),

@@ -17,7 +17,6 @@ from rl_core.kernels.bounds import error_bound
 from rl_core.maze import Maze
 from rl_core.mdp import MDP
 from rl_core.planning import (
-    backup,
     greedy_policy,
     optimal_actions,
     policy_evaluation,
@@ -25,6 +24,7 @@ from rl_core.planning import (
     q_value_iteration,
     value_iteration,
 )
+from studies.by_sweeps import backup
 from studies.random_mazes import random_maze
 
 PLANNERS = {
@@ -606,7 +606,6 @@ CALLS = {
     "value_iteration": (value_iteration, {"mdp", "gamma", "tolerance", "progress"}),
     "policy_iteration": (policy_iteration, {"mdp", "gamma", "progress"}),
     "policy_evaluation": (policy_evaluation, {"mdp", "gamma", "policy"}),
-    "backup": (backup, {"mdp", "gamma", "V"}),
     "greedy_policy": (greedy_policy, {"Q"}),
     "optimal_actions": (optimal_actions, {"Q", "tolerance"}),
 }
@@ -667,14 +666,6 @@ def test_gamma_out_of_range(planner, gamma):
             TypeError,
             "policy .*integers .*float64",
         ),
-        (lambda m: backup(m, np.zeros(3), gamma=0.9), ValueError, r"V must be .* shape \(112\)"),
-        (
-            lambda m: backup(m, np.where(np.arange(112) == 1, np.nan, 0.0), gamma=0.9),
-            ValueError,
-            r"V must be finite, at \(1,\) it is nan",
-        ),
-        (lambda m: backup(m, ["a"] * 112, gamma=0.9), TypeError, "V must be an array of numbers"),
-        (lambda m: backup(m, [[1.0], []], gamma=0.9), ValueError, "V must be an array of numbers"),
         (lambda m: greedy_policy([1.0, 2.0]), ValueError, "Q must be an array of numbers of shape"),
         (lambda m: greedy_policy([[1.0], [np.nan]]), ValueError, r"Q must be finite, at \(1, 0\)"),
         (

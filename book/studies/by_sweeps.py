@@ -1,4 +1,4 @@
-"""Policy iteration whose evaluations are sweeps: the report's way, with a cost in backups."""
+"""Planning one sweep at a time: a backup of all states, and policy iteration made of sweeps."""
 
 import math
 
@@ -12,6 +12,36 @@ from rl_core.mdp import MDP
 from rl_core.planning import Plan, greedy_policy
 
 COLUMNS = ["sweep", "residual", "norm", "policy_changes", "backups", "bound", "evaluation_sweeps"]
+
+
+def backup(mdp: MDP, V: np.ndarray, *, gamma: float) -> np.ndarray:
+    """Look one step ahead of V: return Q(s, a) = Σ_k p_k (r_k + γ V(s'_k)).
+
+    Parameters
+    ----------
+    mdp : MDP
+    V : float64 array of shape (S,)
+        State values.
+    gamma : float
+        Discount.
+
+    Returns
+    -------
+    ndarray of float64, shape (S, A)
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rl_core.mdp import MDP
+    >>> from studies.by_sweeps import backup
+    >>> lake = MDP.from_env("FrozenLake-v1")
+    >>> backup(lake, np.zeros(16), gamma=0.99)[14].round(3).tolist()
+    [0.0, 0.333, 0.333, 0.333]
+    """
+    transitions, reward = _as_kernels_take(mdp)
+    Q = np.zeros((mdp.n_states, mdp.n_actions))
+    sweeps.lookahead(transitions, reward, gamma, V, Q)
+    return Q
 
 
 def policy_iteration_by_sweeps(mdp: MDP, *, gamma: float, threshold: float) -> Plan:

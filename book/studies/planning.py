@@ -18,7 +18,6 @@ from report.seeds import SEEDS
 from rl_core.maze import ACTIONS, Maze
 from rl_core.mdp import MDP
 from rl_core.planning import (
-    backup,
     greedy_policy,
     optimal_actions,
     policy_iteration,
@@ -26,7 +25,7 @@ from rl_core.planning import (
     value_iteration,
 )
 from rl_core.statistics import bootstrap_interval
-from studies.by_sweeps import policy_iteration_by_sweeps
+from studies.by_sweeps import backup, policy_iteration_by_sweeps
 from studies.random_mazes import random_maze
 
 GAMMA = 0.9
