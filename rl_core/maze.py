@@ -116,9 +116,8 @@ class Maze(OwnModel, gym.Env[int, int]):
         self.flag_cells = dict(zip("ABCDEFGHIJKLMNOP", find(letters, "F"), strict=False))
         self._number_states()
         self._tabulate_moves()
-        self.observation_space: spaces.Discrete[Any] = spaces.Discrete(
-            len(self.cells) * len(self._masks)
-        )
+        n_states = len(self.cells) * len(self._masks)
+        self.observation_space: spaces.Discrete[Any] = spaces.Discrete(n_states)
         self.action_space: spaces.Discrete[Any] = spaces.Discrete(len(ACTIONS))
         # As after `gymnasium.make`: the environment knows how to make another one like it.
         kwargs = {"layout": self.layout, "slip": self.slip, "render_mode": render_mode}
@@ -250,11 +249,9 @@ class Maze(OwnModel, gym.Env[int, int]):
         >>> Maze().state(1, 4, "CAB")
         111
         """
-        n_rows, n_columns = self.walls.shape
-        at = (
-            checks.integer("row", row, 0, n_rows - 1),
-            checks.integer("column", column, 0, n_columns - 1),
-        )
+        last_row, last_column = np.array(self.walls.shape) - 1
+        row = checks.integer("row", row, 0, last_row)
+        at = row, checks.integer("column", column, 0, last_column)
         checks.require(not self.walls[at], "row, column", at, "a free cell")
         mask = 0
         for flag in checks.instance("flags", flags, Sequence | Set, "letters of flags"):

@@ -139,13 +139,8 @@ class Gaussian:
     constant_feature: bool = False
 
     def __post_init__(self) -> None:
-        fields(
-            self,
-            mean=(one_of, ("weights", "direct")),
-            sigma=(positive,),
-            learn_sigma=(truth,),
-            constant_feature=(truth,),
-        )
+        switches = dict.fromkeys(("learn_sigma", "constant_feature"), (truth,))
+        fields(self, mean=(one_of, ("weights", "direct")), sigma=(positive,), **switches)
 
 
 def check_network(network: object, engine: object) -> Literal["compiled", "torch"]:

@@ -105,12 +105,10 @@ class ReinforceConfig:
             network=(instance, Network, "MLP(...) or Module('module:function')"),
             policy=(instance, Categorical | Gaussian, "Categorical() or Gaussian(...)"),
             learning_rate=(positive,),
-            batch_size=(integer, 1),
-            epochs=(integer, 1),
             normalise=(one_of, ("standard", "centre", "none")),
-            max_episode_steps=(optional, integer, 1),
-            max_env_steps=(optional, integer, 1),
             learn_from_capped=(truth,),
+            **dict.fromkeys(("batch_size", "epochs"), (integer, 1)),
+            **dict.fromkeys(("max_episode_steps", "max_env_steps"), (optional, integer, 1)),
         )
         object.__setattr__(self, "engine", policies.check_network(self.network, self.engine))
 
