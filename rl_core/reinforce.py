@@ -26,7 +26,7 @@ from collections.abc import Callable, Iterable
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 import torch
@@ -228,16 +228,10 @@ class TorchLearner:
                 self.optimiser.step()
 
 
-class _Agent(NamedTuple):
-    """Who acts, who learns, and what is learned by name."""
-
-    actor: Actor | ModuleActor
-    learn: Callable[..., None]
-    arrays: Callable[[], Arrays]
-
-
-def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator) -> _Agent:
-    """Draw the initial weights and set up the engine that learns them."""
+def _make_agent(
+    config: ReinforceConfig, world: World, rng: np.random.Generator
+) -> tuple[Actor | ModuleActor, Callable[..., None], Callable[[], Arrays]]:
+    """Draw the initial weights; return who acts, what learns, and what gives them by name."""
     hidden = config.network.hidden if isinstance(config.network, MLP) else ()
     spaces = world.n_observations, world.n_actions, world.action_dimensions
     policy = policies.make_policy(config.policy, hidden, *spaces)
@@ -253,7 +247,7 @@ def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator)
             return {**modules.as_arrays(module), **sigma}
 
         actor = ModuleActor(policy, module, log_sigma, np.empty(policy.action_width))
-        return _Agent(actor, learner.learn, by_name)
+        return actor, learner.learn, by_name
     biases = config.network.biases
     parameters = policies.initial_parameters(policy, config.policy, rng)
 
@@ -273,7 +267,7 @@ def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator)
         learn = partial(
             likelihood.learn, likelihood.make_learner(policy, parameters, learns, *rates)
         )
-    return _Agent(likelihood.make_actor(policy, parameters), learn, layers)
+    return likelihood.make_actor(policy, parameters), learn, layers
 
 
 def _log_sigma(config: ReinforceConfig, start: F32) -> torch.nn.Parameter:
