@@ -112,8 +112,8 @@ def number(
 
 def _range(low: float, high: float, above: float, below: float) -> str:
     """Say in words which numbers are meant."""
-    to = "to" if math.isfinite(low) else "up to"
-    bounds = {"from": low, "above": above, to: high, "below": below}
+    upto = "to" if math.isfinite(low) else "up to"
+    bounds = {"from": low, "above": above, upto: high, "below": below}
     parts = [f"{word} {bound:g}" for word, bound in bounds.items() if math.isfinite(bound)]
     bounded = math.isfinite(max(low, above)) and math.isfinite(min(high, below))
     return " ".join(["a number" if bounded else "a finite number", *parts])

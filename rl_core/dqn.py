@@ -123,8 +123,7 @@ class DQNConfig:
             epsilon=(check_epsilon,),
             shaping=(optional, instance, Shaping, "Shaping('module:function')"),
             bootstrap_through_end=(checks.truth,),
-            max_episode_steps=(optional, integer, 1),
-            max_env_steps=(optional, integer, 1),
+            **dict.fromkeys(("max_episode_steps", "max_env_steps"), (optional, integer, 1)),
             **dict.fromkeys(counts, (integer, 1)),
         )
         checks.fields(self, memory_size=(integer, self.batch_size))

@@ -16,9 +16,8 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -95,10 +94,6 @@ class Agent:
     env: Any = None
     rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0), repr=False)
 
-    @cached_property
-    def _greedy(self) -> AnyActor:
-        return greedy(self).actor
-
     def predict(
         self,
         observation: Any,
@@ -138,8 +133,8 @@ class Agent:
         >>> agent.predict(np.ones(1)), agent.predict(np.ones((2, 1)))[0]
         ((np.int64(1), None), array([1, 1]))
         """
-        chosen = self._greedy if truth("deterministic", deterministic) else self.actor
-        actor = episodes.with_own_scratch(chosen)
+        chosen = greedy(self) if truth("deterministic", deterministic) else self
+        actor = episodes.with_own_scratch(chosen.actor)
         policy = actor.policy
         n_seen = int(policy.sizes[0]) - policy.constant_feature
         shape = (n_seen,) if self.spaces is None else self.spaces[0].shape
@@ -683,8 +678,7 @@ def _drawn(env: Any) -> gymnasium.Env[Any, Any]:
     return film
 
 
-@dataclass(frozen=True)
-class Rollout:
+class Rollout(NamedTuple):
     """One episode, for a picture or an animation.
 
     Attributes

@@ -21,6 +21,9 @@ from rl_core.checks import fields, instance, integer, number, optional, positive
 from rl_core.kernels.arrays import F64
 from rl_core.kernels.choices import EPSILON_GREEDY, SOFTMAX, UNNORMALISED_SOFTMAX
 
+SHARE = partial(number, high=1, above=0)
+"""The check of a share: above 0, at most 1."""
+
 
 @dataclass(frozen=True)
 class Linear:
@@ -183,7 +186,7 @@ class VisitDecay:
     exponent: float = 0.6
 
     def __post_init__(self) -> None:
-        fields(self, initial=(check_step_size,), exponent=(partial(number, high=1, above=0),))
+        fields(self, initial=(parameter_of, SHARE), exponent=(SHARE,))
 
 
 @dataclass(frozen=True)
@@ -291,11 +294,7 @@ class UnnormalisedSoftmax:
     """
 
     kind: ClassVar[int] = UNNORMALISED_SOFTMAX
-
-    @property
-    def parameter(self) -> float | Linear:
-        """Not used."""
-        return 1.0
+    parameter: ClassVar[float] = 1.0  # not used
 
 
 ExplorationRule = EpsilonGreedy | Softmax | UnnormalisedSoftmax
@@ -376,5 +375,5 @@ def parameter_of(
 
 
 def check_step_size(name: str, value: object) -> Any:
-    """Return a step size, above 0 and up to 1, or a schedule of it."""
-    return parameter_of(name, value, partial(number, high=1, above=0))
+    """Return a step size: above 0 and up to 1, a schedule of such, or one that shrinks with use."""
+    return value if isinstance(value, VisitDecay) else parameter_of(name, value, SHARE)

@@ -18,8 +18,7 @@ from gymnasium.error import ResetNeeded
 from rl_core import checks
 from rl_core.kernels.arrays import F64, I32, Bools
 from rl_core.mdp import MDP, OwnModel
-from rl_core.worlds.maze_layout import COURSE_LAYOUT, find, read_layout
-from rl_core.worlds.maze_picture import draw_maze
+from rl_core.worlds.maze_layout import COURSE_LAYOUT, draw_maze, find, read_layout
 
 ACTIONS = ("up", "down", "left", "right")
 MOVES = ((-1, 0), (1, 0), (0, -1), (0, 1))
@@ -55,8 +54,8 @@ class Maze(OwnModel, gym.Env[int, int]):
         through another goal. Flags need not be.
     slip : float
         Probability of slipping, in [0, 1].
-    render_mode : {None, "ansi", "rgb_array"}
-        What `render` returns: nothing, a text, or a picture (uint8, shape (height, width, 3)).
+    render_mode : {None, "rgb_array"}
+        What `render` returns: nothing, or a picture (uint8, shape (height, width, 3)).
 
     Attributes
     ----------
@@ -97,7 +96,7 @@ class Maze(OwnModel, gym.Env[int, int]):
     """
 
     # Typed as in gymnasium.Env, which ClassVar would contradict.
-    metadata: dict[str, Any] = {"render_modes": ["ansi", "rgb_array"], "render_fps": 4}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 4}  # noqa: RUF012
 
     def __init__(
         self,
@@ -117,9 +116,8 @@ class Maze(OwnModel, gym.Env[int, int]):
         self.flag_cells = dict(zip("ABCDEFGHIJKLMNOP", find(letters, "F"), strict=False))
         self._number_states()
         self._tabulate_moves()
-        self.observation_space: spaces.Discrete[Any] = spaces.Discrete(
-            len(self.cells) * len(self._masks)
-        )
+        n_states = len(self.cells) * len(self._masks)
+        self.observation_space: spaces.Discrete[Any] = spaces.Discrete(n_states)
         self.action_space: spaces.Discrete[Any] = spaces.Discrete(len(ACTIONS))
         # As after `gymnasium.make`: the environment knows how to make another one like it.
         kwargs = {"layout": self.layout, "slip": self.slip, "render_mode": render_mode}
@@ -251,11 +249,9 @@ class Maze(OwnModel, gym.Env[int, int]):
         >>> Maze().state(1, 4, "CAB")
         111
         """
-        n_rows, n_columns = self.walls.shape
-        at = (
-            checks.integer("row", row, 0, n_rows - 1),
-            checks.integer("column", column, 0, n_columns - 1),
-        )
+        last_row, last_column = np.array(self.walls.shape) - 1
+        row = checks.integer("row", row, 0, last_row)
+        at = row, checks.integer("column", column, 0, last_column)
         checks.require(not self.walls[at], "row, column", at, "a free cell")
         mask = 0
         for flag in checks.instance("flags", flags, Sequence | Set, "letters of flags"):
@@ -285,10 +281,7 @@ class Maze(OwnModel, gym.Env[int, int]):
         return row, column, self._flags_held(flag_set)
 
     def render(self) -> Any:
-        """Return the current state as text or picture, according to `render_mode`.
-
-        The text is the layout with the agent as `@` and flags held as `f`, and a line naming them.
-        The picture is that of `rl_core.worlds.maze_picture.draw_maze`.
+        """Return a picture of the current state (`rl_core.worlds.maze_layout.draw_maze`).
 
         Raises
         ------
@@ -298,12 +291,9 @@ class Maze(OwnModel, gym.Env[int, int]):
         Examples
         --------
         >>> from rl_core.maze import Maze
-        >>> env = Maze("SFG", render_mode="ansi")
-        >>> env.reset()[0]
-        0
-        >>> print(env.render(), end="")
-        @ F G
-        flags held: none
+        >>> env = Maze("SFG", render_mode="rgb_array")
+        >>> env.reset()[0], env.render().shape
+        (0, (96, 288, 3))
         """
         if self.render_mode is None:
             gym.logger.warn("render() needs a render_mode: gymnasium.make(id, render_mode=...)")
@@ -311,17 +301,7 @@ class Maze(OwnModel, gym.Env[int, int]):
         if self._state is None:
             raise ResetNeeded("call reset() before render()")
         row, column, held = self.locate(self._state)
-        if self.render_mode == "rgb_array":
-            return draw_maze(
-                self.walls, self.start, self.goals, self.flag_cells, held, (row, column)
-            )
-        letters = [list(line) for line in self.layout.splitlines()]
-        for flag in held:
-            flag_row, flag_column = self.flag_cells[flag]
-            letters[flag_row][flag_column] = "f"
-        letters[row][column] = "@"
-        lines = [" ".join(line) for line in letters]
-        return "\n".join([*lines, f"flags held: {held or 'none'}", ""])
+        return draw_maze(self.layout.split(), self.flag_cells, held, (row, column))
 
     def _transitions(self) -> tuple[I32, F64]:
         """Return successors and rewards, of shape (cells, flag sets, actions, outcomes)."""

@@ -18,6 +18,7 @@ from rl_core import checks
 from rl_core.kernels.arrays import F64, I32, Bools
 from rl_core.kernels.bounds import SUM_TOLERANCE
 from rl_core.kernels.model import Model
+from rl_core.worlds.environments import EnvironmentLike, opened
 from rl_core.worlds.tables import read_table, start_arrays
 
 STATES_AT_ONCE = 2**14  # bounds the memory of checking
@@ -189,9 +190,7 @@ class MDP:
         return replace(self, **{name: getattr(self, name)[taken][:, None] for name in names})
 
     @classmethod
-    def from_env(
-        cls, env: str | gym.Env[Any, Any], start_distribution: ArrayLike | None = None
-    ) -> MDP:
+    def from_env(cls, env: EnvironmentLike, start_distribution: ArrayLike | None = None) -> MDP:
         """Read the model of a Gymnasium environment with a transition table.
 
         The table is `P[s][a] = [(probability, next state, reward, terminated), ...]`, as in
@@ -207,9 +206,9 @@ class MDP:
 
         Parameters
         ----------
-        env : str or gymnasium.Env
-            An id for `gymnasium.make`, or an environment; of wrappers it may have only such as
-            leave states, actions and rewards alone (`TRANSPARENT`): time limits, records, pictures.
+        env : str, Make, gymnasium.Env or callable
+            See `rl_core.worlds.environments.opened`. Of wrappers it may have only such as leave
+            states, actions and rewards alone (`TRANSPARENT`): time limits, records, pictures.
         start_distribution : array of float, shape (S,), optional
             The probability that an episode starts in each state. By default the environment's
             `initial_state_distrib`, or all on its `start_state_index`.
@@ -222,9 +221,9 @@ class MDP:
         Raises
         ------
         TypeError
-            If `env` is neither an id nor an environment, or `start_distribution` no numbers.
+            If `env` is none of these, or `start_distribution` no numbers.
         ValueError
-            If Gymnasium cannot make the environment (the message says why), a wrapper may change
+            If the environment cannot be made (the message says why), a wrapper may change
             states, actions or rewards, there is no table, the table is malformed (then the message
             names the state, the action and what is there), the start distribution is missing or of
             the wrong shape, or the model's own checks fail.
@@ -237,22 +236,18 @@ class MDP:
         >>> lake.successor.shape, np.flatnonzero(lake.terminal).tolist()
         ((16, 4, 3), [5, 7, 11, 12, 15])
         """
-        if isinstance(env, str):
-            try:
-                made = gym.make(env)
-            except Exception as error:  # whatever the environment's own code raises
-                raise ValueError(
-                    f"env must be an id that Gymnasium can make, got {env!r}: {error}"
-                ) from error
-            with made:
-                return cls.from_env(made, start_distribution)
-        base = _unwrapped(checks.instance("env", env, gym.Env, "an id or a gymnasium.Env"))
-        if not isinstance(base, OwnModel):
-            return cls(**read_table(base, start_distribution))
-        model = base.model()
-        if start_distribution is None:
-            return model
-        return replace(model, **start_arrays(start_distribution, model.n_states))
+        made = opened(env)
+        try:
+            base = _unwrapped(made)
+            if not isinstance(base, OwnModel):
+                return cls(**read_table(base, start_distribution))
+            model = base.model()
+            if start_distribution is None:
+                return model
+            return replace(model, **start_arrays(start_distribution, model.n_states))
+        finally:
+            if made is not env:
+                made.close()
 
     def _check_shapes(self) -> None:
         shape, starts = self.successor.shape, self.start_state.shape
@@ -312,10 +307,8 @@ def checked_policy(name: str, policy: ArrayLike, mdp: MDP) -> NDArray[np.integer
     allowed = f"an array of integers from 0 to {mdp.n_actions - 1}"
     if actions.dtype.kind not in "iu":
         raise TypeError(f"{name} must be {allowed}, got {actions.dtype}")
-    wrong = np.flatnonzero((actions < 0) | (actions >= mdp.n_actions))
-    if len(wrong):
-        found = f"in state {wrong[0]} it is {actions[wrong[0]]}"
-        raise ValueError(f"{name} must be {allowed}, {found}")
+    for state in np.flatnonzero((actions < 0) | (actions >= mdp.n_actions))[:1]:
+        raise ValueError(f"{name} must be {allowed}, in state {state} it is {actions[state]}")
     return actions
 
 
@@ -333,11 +326,9 @@ def _unwrapped(env: gym.Env[Any, Any]) -> gym.Env[Any, Any]:
 
 def _as_array(name: str, values: ArrayLike, dtype: type[np.generic], ndim: int) -> NDArray[Any]:
     """Return a read-only view of `values`; convert its type only if no value changes by it."""
-    kinds, what = {
-        np.int32: ("iu", "integers"),
-        np.float64: ("iuf", "numbers"),
-        np.bool_: ("b", "bools"),
-    }[dtype]
+    kind = np.dtype(dtype).kind
+    kinds = {"i": "iu", "f": "iuf", "b": "b"}[kind]
+    what = {"i": "integers", "f": "numbers", "b": "bools"}[kind]
     allowed = f"an array of {what} with {ndim} axes"
     try:
         given = np.asarray(values)

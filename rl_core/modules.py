@@ -5,7 +5,7 @@ algorithms: the same seed gives the same bits.
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from copy import deepcopy
 from itertools import pairwise
@@ -21,7 +21,7 @@ from rl_core.kernels import networks
 from rl_core.kernels.arrays import F32, Arrays
 from rl_core.policies import MLP, Network
 from rl_core.training import Run, Training, train_seeds
-from rl_core.worlds.environments import EnvironmentLike, World, one_seed_of, open_world
+from rl_core.worlds.environments import EnvironmentLike, one_seed_of, open_world
 
 
 def perceptron(sizes: Sequence[int], parameters: F32, biases: bool = True) -> torch.nn.Sequential:
@@ -149,12 +149,7 @@ def reproducible(seed: int = 0) -> Iterator[None]:
 
 
 def train_networks(
-    train: Callable[[World, Any, Training], None],
-    env: EnvironmentLike,
-    config: object,
-    *,
-    seeds: Iterable[int],
-    **arguments: Any,
+    train: Callable[..., None], env: EnvironmentLike, config: object, seeds: Any, **arguments: Any
 ) -> Run:
     """Train a network a seed, each in a world of its own, with torch made `reproducible`.
 

@@ -33,7 +33,7 @@ from rl_core.kernels import bounds, sweeps
 from rl_core.kernels.arrays import F64, Bools, Ints
 from rl_core.kernels.bounds import error_bound, rounding_error, sweeps_allowed
 from rl_core.kernels.sweeps import TIE, Transitions
-from rl_core.mdp import MDP, checked_policy
+from rl_core.mdp import MDP
 
 DIRECT_LIMIT = 20_000
 """The most states for which equations are solved directly: the factors fill in, to gigabytes."""
@@ -83,11 +83,7 @@ class Plan:
 
 
 def q_value_iteration(
-    mdp: MDP,
-    *,
-    gamma: float,
-    threshold: float = 1e-5,
-    progress: bool = True,
+    mdp: MDP, *, gamma: float, threshold: float = 1e-5, progress: bool = True
 ) -> Plan:
     """Repeat Q ← Σ_k p_k (r_k + γ max_a' Q(s'_k, a')) until Q hardly changes.
 
@@ -275,14 +271,7 @@ def _sweep(
                 break
 
 
-def policy_iteration(
-    mdp: MDP,
-    *,
-    gamma: float,
-    evaluation_threshold: float | None = None,
-    initial_policy: ArrayLike | None = None,
-    progress: bool = True,
-) -> Plan:
+def policy_iteration(mdp: MDP, *, gamma: float, progress: bool = True) -> Plan:
     """Alternate the values of a policy, V^π, and the policy that is greedy for them.
 
     Each round evaluates π, looks one step ahead, Q(s, a) = Σ_k p_k (r_k + γ V^π(s'_k)), and moves
@@ -296,34 +285,24 @@ def policy_iteration(
         The model.
     gamma : float
         Discount, in [0, 1 - 1e-8]. With γ = 1 a policy that never ends has no finite value.
-    evaluation_threshold : float, optional
-        By default policies are evaluated exactly (`policy_evaluation`). With a threshold they are
-        evaluated by synchronous sweeps V ← Σ_k p_k (r_k + γ V(s'_k)) from the V before, until
-        no value changes by as much (θ in Sutton & Barto, section 4.3).
-    initial_policy : array of int, shape (S,), optional
-        Where to begin; by default the policy greedy for the immediate rewards.
     progress : bool
         Show rounds and bound on stderr once two seconds have passed.
 
     Returns
     -------
     Plan
-        Q is one step ahead of V^π. A further column of the table is `evaluation_sweeps`: those of
-        the round's evaluation, 0 if it was exact.
+        Q is one step ahead of V^π.
 
     Raises
     ------
     ValueError, TypeError
         If an argument is out of range or has the wrong type.
-    ArithmeticError
-        If γ is so close to 1 that `evaluation_threshold` is too many sweeps away.
 
     Notes
     -----
-    A linear solve is not made of backups: with exact evaluation `backups` counts the improvements
-    only. To compare the whole cost with `q_value_iteration`, give an `evaluation_threshold`:
-    then it is S backups an evaluation sweep (one action a state) and S A an improvement. Finding
-    the default `initial_policy` looks one step ahead everywhere: S A more, in the first round.
+    Policies are evaluated exactly (`policy_evaluation`). A linear solve is not made of backups:
+    `backups` counts the improvements only, S A each. The first policy is greedy for the immediate
+    rewards. To find it looks one step ahead everywhere: S A more, in the first round.
 
     Examples
     --------
@@ -335,23 +314,15 @@ def policy_iteration(
     (np.float64(0.542026), 0)
     """
     gamma, transitions, reward = _opened(mdp, gamma)
-    threshold = checks.optional("evaluation_threshold", evaluation_threshold, checks.positive)
     largest = _largest(reward, gamma)
     Q, V, policy = _blank(mdp)
-    first = 0  # backups before the first round
-    if initial_policy is None:
-        sweeps.lookahead(transitions, reward, gamma, V, Q)
-        sweeps.greedy(Q, V, policy)
-        Q[:], V[:], first = 0, 0, Q.size
-    else:
-        policy[:] = checked_policy("initial_policy", initial_policy, mdp)
+    sweeps.lookahead(transitions, reward, gamma, V, Q)
+    sweeps.greedy(Q, V, policy)
+    Q[:], backups = 0, 2 * Q.size
     states, changes = np.arange(mdp.n_states), -1
     record = _Record("policy iteration", progress)
     while changes != 0:
-        if threshold is None:
-            V, evaluations = policy_evaluation(mdp, policy, gamma=gamma), 0
-        else:
-            evaluations = _evaluate(mdp, policy, gamma, threshold, V)
+        V = policy_evaluation(mdp, policy, gamma=gamma)
         residual, squares = sweeps.lookahead(transitions, reward, gamma, V, Q)
         best = Q.max(axis=1)
         rounding = rounding_error(mdp.n_successors, max(largest, _magnitude(V)))
@@ -361,11 +332,10 @@ def policy_iteration(
         policy = np.where(better, greedy_policy(Q), policy)
         changes = int(better.sum())
         bound = error_bound(float(np.abs(best - V).max()), gamma, rounding)
-        backups = first + Q.size + evaluations * mdp.n_states
-        record.add(residual, math.sqrt(squares), changes, backups, bound, evaluations)
-        first = 0
+        record.add(residual, math.sqrt(squares), changes, backups, bound)
+        backups = Q.size
     sweeps.greedy(Q, V, policy)
-    return Plan(Q, V, policy, record.table("evaluation_sweeps"))
+    return Plan(Q, V, policy, record.table())
 
 
 def policy_evaluation(mdp: MDP, policy: ArrayLike, *, gamma: float) -> F64:
@@ -418,46 +388,6 @@ def policy_evaluation(mdp: MDP, policy: ArrayLike, *, gamma: float) -> F64:
     V: F64 = splu((identity(S) - gamma * P).tocsc()).solve(r)
     V[mdp.terminal] = 0  # exactly
     return V
-
-
-def backup(mdp: MDP, V: ArrayLike, *, gamma: float) -> F64:
-    """Look one step ahead of V: return Q(s, a) = Σ_k p_k (r_k + γ V(s'_k)).
-
-    Parameters
-    ----------
-    mdp : MDP
-        The model.
-    V : array of float, shape (S,)
-        State values.
-    gamma : float
-        Discount, in [0, 1 - 1e-8].
-
-    Returns
-    -------
-    ndarray of float64, shape (S, A)
-        Action values.
-
-    Raises
-    ------
-    ValueError, TypeError
-        If an argument is out of range, not finite, or has the wrong shape or type.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from rl_core.mdp import MDP
-    >>> from rl_core.planning import backup
-    >>> lake = MDP.from_env("FrozenLake-v1")
-    >>> backup(lake, np.zeros(16), gamma=0.99)[14].round(3).tolist()
-    [0.0, 0.333, 0.333, 0.333]
-    """
-    gamma, transitions, reward = _opened(mdp, gamma)
-    values = checks.floats("V", V, (mdp.n_states,))
-    _largest(reward, gamma)
-    bounds.check_returns("V", _magnitude(values), 0.0)
-    Q = np.zeros((mdp.n_states, mdp.n_actions))
-    sweeps.lookahead(transitions, reward, gamma, values, Q)
-    return Q
 
 
 def greedy_policy(Q: ArrayLike) -> Ints:
@@ -526,26 +456,6 @@ def optimal_actions(Q: ArrayLike, tolerance: float = 1e-9) -> Bools:
     with np.errstate(over="ignore"):
         best: Bools = table >= table.max(axis=1, keepdims=True) - margin
     return best
-
-
-def _evaluate(mdp: MDP, policy: Ints, gamma: float, threshold: float, V: F64) -> int:
-    """Sweep V for one policy until no value changes by `threshold`; return how many sweeps."""
-    _, transitions, reward = _opened(mdp.following(policy), gamma)
-    Q = V[:, None].copy()
-    residual, done, limit = math.inf, 0, 1
-    while residual >= threshold and done < limit:
-        residual, _ = sweeps.lookahead(transitions, reward, gamma, V, Q)
-        V[:] = Q[:, 0]
-        done += 1
-        if done == 1:
-            limit += sweeps_allowed(residual, threshold, gamma)
-    magnitude = max(_magnitude(reward), _magnitude(V))
-    if residual >= max(threshold, rounding_error(mdp.n_successors, magnitude)):
-        raise ArithmeticError(
-            f"evaluation_threshold {threshold} is too many sweeps away for gamma {gamma}; ask for "
-            f"{2 * residual:.0e} or more"
-        )
-    return done  # at the limit only rounding is left
 
 
 class _Record:

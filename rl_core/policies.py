@@ -139,13 +139,8 @@ class Gaussian:
     constant_feature: bool = False
 
     def __post_init__(self) -> None:
-        fields(
-            self,
-            mean=(one_of, ("weights", "direct")),
-            sigma=(positive,),
-            learn_sigma=(truth,),
-            constant_feature=(truth,),
-        )
+        switches = dict.fromkeys(("learn_sigma", "constant_feature"), (truth,))
+        fields(self, mean=(one_of, ("weights", "direct")), sigma=(positive,), **switches)
 
 
 def check_network(network: object, engine: object) -> Literal["compiled", "torch"]:
@@ -231,10 +226,21 @@ def initial_parameters(
     array([0.], dtype=float32)
     """
     network = xavier_uniform(policy.sizes.tolist(), rng)
+    return np.concatenate([network, initial_log_sigma(policy, distribution)])
+
+
+def initial_log_sigma(policy: Policy, distribution: Categorical | Gaussian) -> F32:
+    """Return log sigma to start from, one a component of a Gaussian action.
+
+    Examples
+    --------
+    >>> from rl_core.policies import Gaussian, initial_log_sigma, make_policy
+    >>> initial_log_sigma(make_policy(Gaussian(), (), 2, 0, 1), Gaussian(sigma=1.0))
+    array([0.], dtype=float32)
+    """
     if not isinstance(distribution, Gaussian):
-        return network
-    log_sigma = np.full(policy.action_width, math.log(distribution.sigma), np.float32)
-    return np.concatenate([network, log_sigma])
+        return np.empty(0, np.float32)
+    return np.full(policy.action_width, math.log(distribution.sigma), np.float32)
 
 
 def trainable(policy: Policy, distribution: Categorical | Gaussian, biases: bool) -> F32:

@@ -102,20 +102,15 @@ class QLearningConfig:
         checks.fields(
             self,
             gamma=(checks.number, 0, 1),
-            step_size=(_checked_step_size,),
+            step_size=(exploration.check_step_size,),
             exploration=(checks.instance, ExplorationRule, rules),
-            max_steps=(checks.optional, checks.integer, 1),
-            max_env_steps=(checks.optional, checks.integer, 1),
             evaluation=(checks.instance, Trials, "Trials(...)"),
             bins=(checks.optional, checked_bins),
             levels=(checks.optional, checks.integer, 2),
+            **dict.fromkeys(("max_steps", "max_env_steps"), (checks.optional, checks.integer, 1)),
         )
         without = self.bins is None and self.levels is not None
         checks.require(not without, "levels", self.levels, "None where bins is None")
-
-
-def _checked_step_size(name: str, value: object) -> Any:
-    return value if isinstance(value, VisitDecay) else exploration.check_step_size(name, value)
 
 
 def q_learning(

@@ -26,7 +26,7 @@ from collections.abc import Callable, Iterable
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 import torch
@@ -105,12 +105,10 @@ class ReinforceConfig:
             network=(instance, Network, "MLP(...) or Module('module:function')"),
             policy=(instance, Categorical | Gaussian, "Categorical() or Gaussian(...)"),
             learning_rate=(positive,),
-            batch_size=(integer, 1),
-            epochs=(integer, 1),
             normalise=(one_of, ("standard", "centre", "none")),
-            max_episode_steps=(optional, integer, 1),
-            max_env_steps=(optional, integer, 1),
             learn_from_capped=(truth,),
+            **dict.fromkeys(("batch_size", "epochs"), (integer, 1)),
+            **dict.fromkeys(("max_episode_steps", "max_env_steps"), (optional, integer, 1)),
         )
         object.__setattr__(self, "engine", policies.check_network(self.network, self.engine))
 
@@ -230,25 +228,18 @@ class TorchLearner:
                 self.optimiser.step()
 
 
-class _Agent(NamedTuple):
-    """Who acts, who learns, and what is learned by name."""
-
-    actor: Actor | ModuleActor
-    learn: Callable[..., None]
-    arrays: Callable[[], Arrays]
-
-
-def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator) -> _Agent:
-    """Draw the initial weights and set up the engine that learns them."""
+def _make_agent(
+    config: ReinforceConfig, world: World, rng: np.random.Generator
+) -> tuple[Actor | ModuleActor, Callable[..., None], Callable[[], Arrays]]:
+    """Draw the initial weights; return who acts, what learns, and what gives them by name."""
     hidden = config.network.hidden if isinstance(config.network, MLP) else ()
     spaces = world.n_observations, world.n_actions, world.action_dimensions
     policy = policies.make_policy(config.policy, hidden, *spaces)
-    n_sigmas = policy.action_width if policy.gaussian else 0
+    sigmas = policies.initial_log_sigma(policy, config.policy)
     if not isinstance(config.network, MLP):
         n_inputs, n_outputs = policy.sizes.tolist()
         module = modules.make_module(config.network, n_inputs, n_outputs, rng)
-        start = math.log(config.policy.sigma) if isinstance(config.policy, Gaussian) else 0.0
-        log_sigma = _log_sigma(config, torch.full((n_sigmas,), start))
+        log_sigma = _log_sigma(config, sigmas)
         learner = TorchLearner(policy, module, log_sigma, config)
 
         def by_name() -> Arrays:
@@ -256,7 +247,7 @@ def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator)
             return {**modules.as_arrays(module), **sigma}
 
         actor = ModuleActor(policy, module, log_sigma, np.empty(policy.action_width))
-        return _Agent(actor, learner.learn, by_name)
+        return actor, learner.learn, by_name
     biases = config.network.biases
     parameters = policies.initial_parameters(policy, config.policy, rng)
 
@@ -266,9 +257,9 @@ def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator)
 
     learn: Callable[..., None]
     if config.engine == "torch":
-        vector = torch.from_numpy(parameters)  # actor and module share its memory
+        # Actor and module share the memory of the parameters.
         module = modules.perceptron(policy.sizes.tolist(), parameters, biases)
-        log_sigma = _log_sigma(config, vector[len(vector) - n_sigmas :])
+        log_sigma = _log_sigma(config, parameters[len(parameters) - len(sigmas) :])
         learn = TorchLearner(policy, module, log_sigma, config).learn
     else:
         learns = policies.trainable(policy, config.policy, biases)
@@ -276,12 +267,12 @@ def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator)
         learn = partial(
             likelihood.learn, likelihood.make_learner(policy, parameters, learns, *rates)
         )
-    return _Agent(likelihood.make_actor(policy, parameters), learn, layers)
+    return likelihood.make_actor(policy, parameters), learn, layers
 
 
-def _log_sigma(config: ReinforceConfig, start: torch.Tensor) -> torch.nn.Parameter:
+def _log_sigma(config: ReinforceConfig, start: F32) -> torch.nn.Parameter:
     learns = isinstance(config.policy, Gaussian) and config.policy.learn_sigma
-    return torch.nn.Parameter(start, requires_grad=learns)
+    return torch.nn.Parameter(torch.from_numpy(start), requires_grad=learns)
 
 
 def _orders(config: ReinforceConfig, steps: int, rng: np.random.Generator) -> I64:

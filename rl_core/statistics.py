@@ -111,14 +111,17 @@ def bootstrap_interval(
     points = values.reshape(len(values), -1).T.copy()
     unknown = values.ndim == 1 and np.isnan(values).any()
     checks.require(not unknown, "values", values, "without NaN")
-    trim = _trim(statistic, len(values))
-    counts = _seed_counts(len(values), resamples, rng)
+    n = len(values)
+    trims = (np.mean, 0), (iqm, n // 4), (np.median, (n - 1) // 2)
+    trim = [g for known, g in trims if statistic is known]
+    checks.require(trim, "statistic", statistic, "np.median, np.mean or iqm")
+    counts = _seed_counts(n, resamples, rng)
     low, high = np.empty(len(points)), np.empty(len(points))
     for start in range(0, len(points), POINTS_AT_ONCE):
         part = slice(start, start + POINTS_AT_ONCE)
         order = np.argsort(points[part], axis=1)
         ordered = np.take_along_axis(points[part], order, axis=1)
-        low[part], high[part] = _limits(_trimmed_means(ordered, order, counts, trim), level)
+        low[part], high[part] = _limits(_trimmed_means(ordered, order, counts, trim[0]), level)
     estimate = _averaged(points, statistic, axis=1)
     low[np.isnan(estimate)] = high[np.isnan(estimate)] = np.nan
     if values.ndim == 1:
@@ -266,14 +269,6 @@ def _trimmed_means(ordered: F64, order: I64, counts: I64, trim: int) -> F64:
                         break
             means[p, r] = total / (end - trim)
     return means
-
-
-def _trim(statistic: Statistic, n: int) -> int:
-    """Return how many of n ordered values `statistic` leaves out at either end."""
-    trims = (np.mean, 0), (iqm, n // 4), (np.median, (n - 1) // 2)
-    found = [trim for known, trim in trims if statistic is known]
-    checks.require(found, "statistic", statistic, "np.median, np.mean or iqm")
-    return found[0]
 
 
 def _seed_counts(n_seeds: int, resamples: int, rng: np.random.Generator) -> I64:

@@ -334,9 +334,6 @@ def weights_of(
     instance("moment", moment, str, "a text")
     require(all(isinstance(name, str) for name in arrays), "arrays", list(arrays), "named by texts")
     names = [name for name in arrays if name.rpartition("/")[0] == moment.rstrip("/")]
-    if not names:
-        raise ValueError(
-            f"moment must be one of which the arrays are, {sorted(arrays)}, got {moment!r}"
-        )
+    require(names, "moment", moment, f"one of which the arrays are, {sorted(arrays)}")
     position = integer("position", position, 0, min(len(arrays[name]) for name in names) - 1)
     return {name.rpartition("/")[2]: arrays[name][position] for name in names}

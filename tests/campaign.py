@@ -113,7 +113,7 @@ def lake() -> MDP:
 
 @cache
 def maze() -> Maze:
-    made = Maze(render_mode="ansi")
+    made = Maze(render_mode="rgb_array")
     made.reset(seed=0)
     return made
 
@@ -207,14 +207,11 @@ CALLS: dict[str, Callable[[], dict[str, Any]]] = {
     "mdp.MDP.from_env": lambda: {"env": "FrozenLake-v1", "start_distribution": np.eye(16)[0]},
     "modules.load_arrays": lambda: {"module": torch.nn.Linear(1, 1),
                                     "arrays": {"weight": np.zeros((1, 1)), "bias": np.zeros(1)}},
-    "planning.backup": lambda: {"mdp": lake(), "V": np.zeros(16), "gamma": 0.9},
     "planning.greedy_policy": lambda: {"Q": np.zeros((3, 2))},
     "planning.optimal_actions": lambda: {"Q": np.zeros((3, 2)), "tolerance": 0.1},
     "planning.policy_evaluation": lambda: {"mdp": lake(), "policy": np.zeros(16, int),
                                            "gamma": 0.9},
-    "planning.policy_iteration": lambda: {"mdp": lake(), "gamma": 0.9, "progress": False,
-                                          "evaluation_threshold": 0.1,
-                                          "initial_policy": np.zeros(16, int)},
+    "planning.policy_iteration": lambda: {"mdp": lake(), "gamma": 0.9, "progress": False},
     "planning.q_value_iteration": lambda: {"mdp": lake(), "gamma": 0.9, "threshold": 0.1,
                                            "progress": False},
     "planning.value_iteration": lambda: {"mdp": lake(), "gamma": 0.9, "tolerance": 0.1,
@@ -259,7 +256,7 @@ CALLS: dict[str, Callable[[], dict[str, Any]]] = {
     "worlds.names.identity": lambda: {"env": "CartPole-v1"},
     "worlds.names.name_of": lambda: {"env": "CartPole-v1"},
     "worlds.names.make_environment": lambda: {"env": "CartPole-v1"},
-    "worlds.shaping.Shaping": lambda: {"function": "rl_core.worlds.shaping:tip_height"},
+    "worlds.shaping.Shaping": lambda: {"function": "rl_core.worlds.shaping:original"},
     "worlds.tasks.Task": lambda: settings(CartPole),
     "worlds.tasks.task": lambda: {"n_state": 1, "observation_space": BOX,
                                   "action_space": spaces.Discrete(2), "max_episode_steps": 5},
@@ -292,6 +289,7 @@ INSIDE = {
     "modules.train_networks": "inside the learners; what it is told is checked by train_seeds",
     "modules.reproducible": "around training; its seed is a seed that was checked",
     "planning.Plan": "returned",
+    "policies.initial_log_sigma": "of what make_policy returns",
     "policies.initial_parameters": "of what make_policy returns",
     "policies.make_policy": "of a config and a world that were checked",
     "policies.trainable": "of what make_policy returns",
@@ -313,13 +311,10 @@ INSIDE = {
     "worlds.environments.step": "every step; what an environment returns: test_environments.py",
     "worlds.episodes": "the loop over an episode, every step",
     "worlds.maze_layout.find": "of what read_layout returns",
-    "worlds.maze_picture": "of a Maze that was checked",
-    "worlds.shaping.balance": "every step",
+    "worlds.maze_layout.draw_maze": "of a Maze that was checked",
     "worlds.shaping.compiled_shape": "inside Shaping",
-    "worlds.shaping.distance_from_start": "every step",
     "worlds.shaping.original": "every step",
     "worlds.shaping.shape_for": "inside dqn, of a config that was checked",
-    "worlds.shaping.tip_height": "every step",
     "worlds.names.check_elsewhere": "inside run, of an environment that was found",
     "worlds.tables": "inside MDP.from_env",
     "worlds.tabular": "every step, of a world that was opened",

@@ -36,12 +36,12 @@ from drawings.maze import situation_figure  # noqa: E402
 from rl_core.exploration import EpsilonGreedy  # noqa: E402
 from rl_core.maze import ACTIONS, CLOCKWISE, Maze  # noqa: E402
 from rl_core.planning import (  # noqa: E402
-    backup,
     optimal_actions,
     policy_iteration,
     value_iteration,
 )
 from rl_core.q_learning import QLearningConfig, q_learning  # noqa: E402
+from studies.by_sweeps import backup  # noqa: E402
 
 PAGE = """<!doctype html><html lang="en"><head><meta charset="utf-8"><title>Demonstration</title>
 <meta name="viewport" content="width=device-width"><style>

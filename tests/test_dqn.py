@@ -40,14 +40,14 @@ SMALL = DQNConfig.report_2018(
     max_episode_steps=400,
 )
 CONFIGS = {
-    "Acrobot-v1": dataclasses.replace(SMALL, shaping=Shaping("rl_core.worlds.shaping:tip_height")),
+    "Acrobot-v1": dataclasses.replace(SMALL, shaping=Shaping("studies.rewards:tip_height")),
     "MountainCar-v0": dataclasses.replace(
         SMALL,
         optimiser="adam",
         network=MLP((10, 20), biases=True),
         persistence=7,
         epsilon=Linear(1.0, 0.2, steps=500),
-        shaping=Shaping("rl_core.worlds.shaping:distance_from_start"),
+        shaping=Shaping("studies.rewards:distance_from_start"),
         bootstrap_through_end=True,
     ),
 }
@@ -558,7 +558,7 @@ CART_POLE = DQNConfig.report_2018(
     update_every=2,
     copy_every=100,
     epsilon=Linear(1.0, 0.0, steps=5_000),
-    shaping=Shaping("rl_core.worlds.shaping:balance"),
+    shaping=Shaping("toy_shaping:balance"),
     max_env_steps=80_000,
 )
 
@@ -708,7 +708,7 @@ def test_a_memory_beyond_what_the_machine_has_is_refused():
         ("epsilon", None, TypeError),
         ("epsilon", Linear(1, 0, episodes=9), ValueError),
         ("persistence", 0, ValueError),
-        ("shaping", "rl_core.worlds.shaping:tip_height", TypeError),
+        ("shaping", "studies.rewards:tip_height", TypeError),
         ("bootstrap_through_end", 0, TypeError),
         ("max_episode_steps", 0, ValueError),
         ("max_env_steps", -1, ValueError),
@@ -826,5 +826,5 @@ def test_seeds_share_no_environment():
 def test_a_config_is_plain_data():
     for config in CONFIGS.values():
         assert json.loads(json.dumps(dataclasses.asdict(config)))["gamma"] == 0.99
-    one, two = Shaping("test_dqn:doubled"), Shaping("rl_core.worlds.shaping:tip_height")
+    one, two = Shaping("test_dqn:doubled"), Shaping("studies.rewards:tip_height")
     assert one.code != two.code

@@ -9,9 +9,9 @@ import pytest
 from rl_core.evaluation import as_learned, evaluate, uniform
 from rl_core.policies import MLP, Gaussian
 from rl_core.reinforce import ReinforceConfig
-from rl_core.worlds import shaping
 from rl_core.worlds.discretise import gridded
 from studies import evaluation as study
+from studies import rewards
 from studies.shared import of_table
 
 
@@ -50,8 +50,8 @@ def test_rankings_that_agree_and_that_do_not():
 
 def test_shaped_returns_are_those_that_dqn_learns_from():
     for name, shape in (
-        ("Acrobot", shaping.tip_height),
-        ("MountainCar", shaping.distance_from_start),
+        ("Acrobot", rewards.tip_height),
+        ("MountainCar", rewards.distance_from_start),
     ):
         seen = []
 

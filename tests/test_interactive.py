@@ -24,8 +24,9 @@ from matplotlib.figure import Figure
 
 from rl_core.exploration import EpsilonGreedy
 from rl_core.maze import Maze
-from rl_core.planning import backup, optimal_actions, q_value_iteration, value_iteration
+from rl_core.planning import optimal_actions, q_value_iteration, value_iteration
 from rl_core.q_learning import QLearningConfig, VisitDecay, q_learning
+from studies.by_sweeps import backup
 
 MAZE = Maze()
 MODEL = MAZE.model()

@@ -502,7 +502,7 @@ def test_goal_absorbs_in_the_environment_too() -> None:
 
 
 def test_misuse_is_named() -> None:
-    maze = Maze(render_mode="ansi")
+    maze = Maze(render_mode="rgb_array")
     with pytest.raises(gym.error.ResetNeeded):
         maze.step(0)
     with pytest.raises(gym.error.ResetNeeded):
@@ -516,7 +516,7 @@ def test_misuse_is_named() -> None:
 # Gymnasium
 
 
-@pytest.mark.parametrize("render_mode", [None, "ansi", "rgb_array"])
+@pytest.mark.parametrize("render_mode", [None, "rgb_array"])
 def test_check_env_has_nothing_to_say(render_mode: str | None) -> None:
     check_env(Maze(render_mode=render_mode))
     check_env(gym.make("rl_core/Maze-v0", render_mode=render_mode).unwrapped)
@@ -531,11 +531,11 @@ def test_made_with_other_arguments() -> None:
 
 
 def test_an_environment_can_make_another_like_it() -> None:
-    maze = Maze("SOFOG", slip=0.25, render_mode="ansi")
+    maze = Maze("SOFOG", slip=0.25, render_mode="rgb_array")
     assert maze.spec is not None
     other = maze.spec.make().unwrapped
     assert isinstance(other, Maze)
-    assert (other.layout, other.slip, other.render_mode) == ("SOFOG\n", 0.25, "ansi")
+    assert (other.layout, other.slip, other.render_mode) == ("SOFOG\n", 0.25, "rgb_array")
 
 
 def test_a_copy_goes_on_from_where_the_maze_is() -> None:
@@ -554,19 +554,6 @@ def test_vectorised() -> None:
     states, *_ = envs.step(np.array([1, 1, 1]))
     assert set(states.tolist()) <= {8, 0}
     envs.close()
-
-
-def test_ansi() -> None:
-    maze = Maze(slip=0.0, render_mode="ansi")
-    maze.reset(seed=0)
-    for action in (1, 3, 3, 0, 1):
-        maze.step(action)
-    assert maze.render() == (
-        "S W f W G\nO O @ O O\nW O O O W\nF O W F W\nflags held: A\n"
-    )  # fmt: skip
-    maze.reset()
-    assert maze.render().startswith("@ W F W G\n")
-    assert maze.render().endswith("flags held: none\n")
 
 
 def test_rgb_array_shows_every_state_differently() -> None:

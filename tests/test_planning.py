@@ -17,7 +17,6 @@ from rl_core.kernels.bounds import error_bound
 from rl_core.maze import Maze
 from rl_core.mdp import MDP
 from rl_core.planning import (
-    backup,
     greedy_policy,
     optimal_actions,
     policy_evaluation,
@@ -25,15 +24,13 @@ from rl_core.planning import (
     q_value_iteration,
     value_iteration,
 )
+from studies.by_sweeps import backup
 from studies.random_mazes import random_maze
 
 PLANNERS = {
     "q_value_iteration": lambda mdp, gamma: q_value_iteration(mdp, gamma=gamma, threshold=1e-10),
     "value_iteration": lambda mdp, gamma: value_iteration(mdp, gamma=gamma, tolerance=1e-8),
     "policy_iteration": lambda mdp, gamma: policy_iteration(mdp, gamma=gamma),
-    "with evaluation sweeps": lambda mdp, gamma: policy_iteration(
-        mdp, gamma=gamma, evaluation_threshold=1e-10
-    ),
 }
 each_planner = pytest.mark.parametrize("planner", PLANNERS.values(), ids=PLANNERS.keys())
 
@@ -324,24 +321,11 @@ def test_table_of_value_iteration():
 def test_table_of_policy_iteration():
     mdp = Maze().model()
     exact = policy_iteration(mdp, gamma=0.9).table
-    swept = policy_iteration(mdp, gamma=0.9, evaluation_threshold=1e-6).table
-    assert exact["policy_changes"].tolist() == swept["policy_changes"].tolist()
     assert exact["policy_changes"].iloc[-1] == 0
     assert (exact["policy_changes"].iloc[:-1] > 0).all()
     # One look ahead a round, and one before the first, for the policy to begin with.
     assert exact["backups"].tolist() == [448 * (sweep + 1) for sweep in exact["sweep"]]
-    assert (exact["evaluation_sweeps"] == 0).all()
-    cost = 448 + 112 * swept["evaluation_sweeps"]
-    assert swept["backups"].tolist() == (448 + cost.cumsum()).tolist()
     assert exact["bound"].iloc[-1] < 1e-10
-
-
-def test_policy_iteration_from_the_optimum_takes_one_round():
-    mdp = MDP.from_env("Taxi-v4")
-    policy = value_iteration(mdp, gamma=0.9, tolerance=1e-9).policy
-    table = policy_iteration(mdp, gamma=0.9, initial_policy=policy).table
-    assert len(table) == 1
-    assert table["backups"].tolist() == [mdp.n_states * mdp.n_actions]  # no policy to be found
 
 
 def test_policy_iteration_improves_every_round():
@@ -351,8 +335,7 @@ def test_policy_iteration_improves_every_round():
         values.append(policy_evaluation(mdp, policy, gamma=0.95))
         policy = greedy_policy(backup(mdp, values[-1], gamma=0.95))
     assert (np.diff(values, axis=0) >= -1e-9).all()
-    rounds = policy_iteration(mdp, gamma=0.95, initial_policy=np.zeros(40, int)).table
-    assert len(rounds) < 20
+    assert len(policy_iteration(mdp, gamma=0.95).table) < 20
     assert pytest.approx(policy_iteration(mdp, gamma=0.95).V) == values[-1]
 
 
@@ -485,10 +468,6 @@ def test_what_float64_cannot_do_is_refused():
     ring = model([[[1]], [[2]], [[0]]], np.ones((3, 1, 1)), reward)
     with pytest.raises(ArithmeticError, match="threshold 1e-18 is below"):
         q_value_iteration(ring, gamma=0.9, threshold=1e-18)
-    assert (
-        pytest.approx(exact_values(ring, 0.9))
-        == policy_iteration(ring, gamma=0.9, evaluation_threshold=1e-18).V
-    )
 
 
 def test_the_tolerance_an_error_names_can_be_had():
@@ -563,7 +542,6 @@ def test_the_bound_of_a_sweep_in_place_is_attained():
     [
         (q_value_iteration, {"threshold": 1e-5}, "threshold 1e-05"),
         (value_iteration, {"tolerance": 1e-6}, "tolerance 1e-06"),
-        (policy_iteration, {"evaluation_threshold": 1e-6}, "evaluation_threshold 1e-06"),
     ],
 )
 def test_what_would_take_too_many_sweeps_is_refused(monkeypatch, planner, options, name):
@@ -572,8 +550,7 @@ def test_what_would_take_too_many_sweeps_is_refused(monkeypatch, planner, option
         planner(ring(1.0, 2.0), gamma=1 - 1e-7, progress=False, **options)
     # Where episodes end, values are found all the same.
     maze = Maze().model()
-    if planner is not policy_iteration:
-        assert planner(maze, gamma=1 - 1e-7, **options).V[0] == pytest.approx(3, abs=1e-4)
+    assert planner(maze, gamma=1 - 1e-7, **options).V[0] == pytest.approx(3, abs=1e-4)
 
 
 def test_equations_are_solved_for_a_discount_close_to_1():
@@ -582,38 +559,12 @@ def test_equations_are_solved_for_a_discount_close_to_1():
     assert plan.V[0] == pytest.approx((1 + 2 * gamma) / (1 - gamma**2), rel=1e-7)
 
 
-def test_a_coarse_evaluation_never_changes_an_optimal_policy():
-    rng = np.random.default_rng(11)
-    for _ in range(20):
-        mdp = random_model(rng, 20)
-        policy = value_iteration(mdp, gamma=0.99, tolerance=1e-9).policy
-        table = policy_iteration(
-            mdp, gamma=0.99, evaluation_threshold=5.0, initial_policy=policy
-        ).table
-        assert table["policy_changes"].tolist() == [0]
-        assert table["bound"].iloc[-1] > 10  # coarse
-
-
 def test_large_models_are_evaluated_as_exactly_as_float64_allows(monkeypatch):
     monkeypatch.setattr(planning, "DIRECT_LIMIT", 0)
     gamma = 1 - 1e-7
     mdp = model([[[1]], [[1]]], np.ones((2, 1, 1)), [[[0.0]], [[1.0]]])
     V = policy_evaluation(mdp, [0, 0], gamma=gamma)
     assert pytest.approx([gamma / (1 - gamma), 1 / (1 - gamma)], rel=1e-7) == V
-
-
-@pytest.mark.parametrize("threshold", [None, 1e-3])
-def test_to_name_the_default_initial_policy_saves_its_backups_only(threshold):
-    mdp = random_model(np.random.default_rng(2), 30)
-    immediate = greedy_policy(backup(mdp, np.zeros(30), gamma=0.9))
-    default, named = (
-        policy_iteration(mdp, gamma=0.9, evaluation_threshold=threshold, initial_policy=initial)
-        for initial in (None, immediate)
-    )
-    assert len(default.table) > 1
-    assert (default.table["backups"] - named.table["backups"]).tolist() == [90] * len(named.table)
-    assert default.table.drop(columns="backups").equals(named.table.drop(columns="backups"))
-    assert default.Q.tobytes() == named.Q.tobytes()
 
 
 @pytest.mark.parametrize("planner", [q_value_iteration, value_iteration, policy_iteration])
@@ -653,12 +604,8 @@ CALLS = {
         {"mdp", "gamma", "threshold", "progress"},
     ),
     "value_iteration": (value_iteration, {"mdp", "gamma", "tolerance", "progress"}),
-    "policy_iteration": (
-        policy_iteration,
-        {"mdp", "gamma", "evaluation_threshold", "initial_policy", "progress"},
-    ),
+    "policy_iteration": (policy_iteration, {"mdp", "gamma", "progress"}),
     "policy_evaluation": (policy_evaluation, {"mdp", "gamma", "policy"}),
-    "backup": (backup, {"mdp", "gamma", "V"}),
     "greedy_policy": (greedy_policy, {"Q"}),
     "optimal_actions": (optimal_actions, {"Q", "tolerance"}),
 }
@@ -709,16 +656,6 @@ def test_gamma_out_of_range(planner, gamma):
         (lambda m: value_iteration(m, gamma=0.9, tolerance=None), TypeError, "tolerance must be a"),
         (lambda m: q_value_iteration(m, gamma=0.9, threshold=-1), ValueError, "threshold .* -1"),
         (
-            lambda m: policy_iteration(m, gamma=0.9, evaluation_threshold=0),
-            ValueError,
-            "evaluation_threshold must be a .* above 0 or None, got 0",
-        ),
-        (
-            lambda m: policy_iteration(m, gamma=0.9, initial_policy=[0, 1]),
-            ValueError,
-            r"initial_policy must be .* shape \(112\), got \(2,\)",
-        ),
-        (
             lambda m: policy_evaluation(m, np.full(112, 4), gamma=0.9),
             ValueError,
             "policy must be an array of integers from 0 to 3, in state 0 it is 4",
@@ -729,14 +666,6 @@ def test_gamma_out_of_range(planner, gamma):
             TypeError,
             "policy .*integers .*float64",
         ),
-        (lambda m: backup(m, np.zeros(3), gamma=0.9), ValueError, r"V must be .* shape \(112\)"),
-        (
-            lambda m: backup(m, np.where(np.arange(112) == 1, np.nan, 0.0), gamma=0.9),
-            ValueError,
-            r"V must be finite, at \(1,\) it is nan",
-        ),
-        (lambda m: backup(m, ["a"] * 112, gamma=0.9), TypeError, "V must be an array of numbers"),
-        (lambda m: backup(m, [[1.0], []], gamma=0.9), ValueError, "V must be an array of numbers"),
         (lambda m: greedy_policy([1.0, 2.0]), ValueError, "Q must be an array of numbers of shape"),
         (lambda m: greedy_policy([[1.0], [np.nan]]), ValueError, r"Q must be finite, at \(1, 0\)"),
         (

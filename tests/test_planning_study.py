@@ -6,8 +6,9 @@ import pytest
 
 from drawings.maze import follow_policy
 from rl_core.maze import Maze
-from rl_core.planning import policy_iteration, q_value_iteration, value_iteration
+from rl_core.planning import q_value_iteration, value_iteration
 from studies import planning as study
+from studies.by_sweeps import policy_iteration_by_sweeps
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +87,7 @@ def test_the_progress_of_policy_iteration_is_that_of_its_swept_values(maze):
     V_star = value_iteration(mdp, gamma=0.9, tolerance=1e-12).V
     for name, plan in (
         ("value", q_value_iteration(mdp, gamma=0.9, threshold=1e-5)),
-        ("policy", policy_iteration(mdp, gamma=0.9, evaluation_threshold=1e-5)),
+        ("policy", policy_iteration_by_sweeps(mdp, gamma=0.9, threshold=1e-5)),
     ):
         table = progress[name]
         assert table["backups"].tolist() == plan.table["backups"].tolist()

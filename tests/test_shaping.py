@@ -4,21 +4,19 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from toy_shaping import balance
 
 from rl_core.dqn import DQNConfig, check_dqn, dqn
 from rl_core.policies import MLP
-from rl_core.worlds.shaping import (
-    Shaping,
-    balance,
-    compiled_shape,
-    distance_from_start,
-    original,
-    shape_for,
-    shaped_reward,
-    tip_height,
-)
+from rl_core.worlds.shaping import Shaping, compiled_shape, original, shape_for, shaped_reward
+from studies.rewards import distance_from_start, tip_height
 
-HERE = "rl_core.worlds.shaping"
+REWARDS = ("studies.rewards:tip_height", "studies.rewards:distance_from_start")
+SHAPES = {
+    "rl_core.worlds.shaping:original": original,
+    **dict(zip(REWARDS, (tip_height, distance_from_start), strict=True)),
+    "toy_shaping:balance": balance,
+}
 
 
 def beyond(observation, reward):
@@ -60,10 +58,10 @@ def test_the_tip_is_as_high_as_its_links_reach(theta1, theta2):
     assert tip_height(np.array(angles, np.float32), -1.0) == pytest.approx(expected, abs=1e-6)
 
 
-@pytest.mark.parametrize("name", ["original", "tip_height", "distance_from_start", "balance"])
-def test_compiled_shapes_are_the_functions(name):
+@pytest.mark.parametrize("path", SHAPES)
+def test_compiled_shapes_are_the_functions(path):
     """To the precision of the observation, in which compiled code multiplies."""
-    plain, compiled = globals()[name], compiled_shape(f"{HERE}:{name}")
+    plain, compiled = SHAPES[path], compiled_shape(path)
     for o in np.random.default_rng(0).normal(size=(50, 6)).astype(np.float32):
         assert shaped_reward(compiled, o, -1.0) == pytest.approx(plain(o, -1.0), abs=1e-6)
 
@@ -82,7 +80,7 @@ def test_what_is_no_path_is_refused(function):
 
 def test_a_shaping_for_longer_observations_is_refused_before_anything_runs():
     assert shape_for(None, 1)(np.ones(1, np.float32), 2.5) == 2.5
-    for function in ("test_shaping:beyond", f"{HERE}:tip_height", f"{HERE}:balance"):
+    for function in ("test_shaping:beyond", REWARDS[0], "toy_shaping:balance"):
         config = DQNConfig(network=MLP(()), shaping=Shaping(function))
         message = rf"^shaping must be a function of observations of 2 numbers, got '{function}'"
         with pytest.raises(ValueError, match=message):

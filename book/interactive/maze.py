@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from interactive.page import Widget, doubles
 from rl_core.maze import Maze
 from rl_core.planning import (
-    backup,
     greedy_policy,
     optimal_actions,
     policy_evaluation,
     policy_iteration,
     q_value_iteration,
 )
+from studies.by_sweeps import backup
 
 
 @dataclass(frozen=True)

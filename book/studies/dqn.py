@@ -36,8 +36,8 @@ ENV = {"Acrobot": "Acrobot-v1", "MountainCar": "MountainCar-v0"}
 CAP = {"Acrobot": 5_000, "MountainCar": 10_000}  # steps an episode, as in 2018
 MEMORY = {"Acrobot": 3_000, "MountainCar": 4_000}
 SHAPING = {
-    "Acrobot": Shaping("rl_core.worlds.shaping:tip_height"),
-    "MountainCar": Shaping("rl_core.worlds.shaping:distance_from_start"),
+    "Acrobot": Shaping("studies.rewards:tip_height"),
+    "MountainCar": Shaping("studies.rewards:distance_from_start"),
 }
 PARTS = 10  # of a budget, in the curves of steps a goal
 WINDOW = 10  # episodes; "steps at episode k" is a seed's median over the last 10 up to k

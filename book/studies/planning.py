@@ -18,7 +18,6 @@ from report.seeds import SEEDS
 from rl_core.maze import ACTIONS, Maze
 from rl_core.mdp import MDP
 from rl_core.planning import (
-    backup,
     greedy_policy,
     optimal_actions,
     policy_iteration,
@@ -26,6 +25,7 @@ from rl_core.planning import (
     value_iteration,
 )
 from rl_core.statistics import bootstrap_interval
+from studies.by_sweeps import backup, policy_iteration_by_sweeps
 from studies.random_mazes import random_maze
 
 GAMMA = 0.9
@@ -305,7 +305,7 @@ def cost_ratios(mdp: MDP) -> dict[str, float]:
     Both count backups, so evaluation has to be by sweeps, stopped at the same threshold.
     """
     by_value = q_value_iteration(mdp, gamma=GAMMA, threshold=THRESHOLD).table
-    by_policy = policy_iteration(mdp, gamma=GAMMA, evaluation_threshold=THRESHOLD).table
+    by_policy = policy_iteration_by_sweeps(mdp, gamma=GAMMA, threshold=THRESHOLD).table
     work_by_value, work_by_policy = by_value["backups"].max(), by_policy["backups"].max()
     sweep = work_by_value / len(by_value)
     # A full sweep finds the first policy, and each round's improvement is another.
@@ -318,6 +318,7 @@ def cost_ratios(mdp: MDP) -> dict[str, float]:
 
 
 ACCURACY = 1e-10
+SOLVED = "policy iteration, evaluation by linear solve"
 METHODS = {
     "Q-value iteration (the report's)": lambda mdp: q_value_iteration(
         mdp, gamma=GAMMA, threshold=ACCURACY * (1 - GAMMA) / GAMMA
@@ -325,10 +326,10 @@ METHODS = {
     "value iteration in a good order": lambda mdp: value_iteration(
         mdp, gamma=GAMMA, tolerance=ACCURACY
     ),
-    "policy iteration, evaluation by sweeps": lambda mdp: policy_iteration(
-        mdp, gamma=GAMMA, evaluation_threshold=ACCURACY * (1 - GAMMA) / GAMMA
+    "policy iteration, evaluation by sweeps": lambda mdp: policy_iteration_by_sweeps(
+        mdp, gamma=GAMMA, threshold=ACCURACY * (1 - GAMMA) / GAMMA
     ),
-    "policy iteration, evaluation by linear solve": lambda mdp: policy_iteration(mdp, gamma=GAMMA),
+    SOLVED: lambda mdp: policy_iteration(mdp, gamma=GAMMA),
 }
 
 
@@ -346,7 +347,7 @@ def costs(mdp: MDP, repeats: int = 20) -> pd.DataFrame:
             {
                 "method": method,
                 "sweeps or rounds": len(table),
-                **evaluations(table),
+                **evaluations(method, table),
                 "backups": int(table["backups"].max()),
                 "time (ms)": 1000 * float(np.median(times)),
             }
@@ -354,16 +355,16 @@ def costs(mdp: MDP, repeats: int = 20) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def evaluations(table: pd.DataFrame) -> dict[str, int]:
+def evaluations(method: str, table: pd.DataFrame) -> dict[str, int]:
     """How the policies of a plan were evaluated: by how many sweeps, and by how many solves.
 
-    Value iteration in a good order has rows for its evaluation sweeps, policy iteration a column.
+    Value iteration in a good order has rows for its evaluation sweeps, policy iteration by sweeps
+    a column; of linear solves there is one a round.
     """
-    if "kind" in table:
-        return {"evaluation sweeps": int((table["kind"] == "evaluation").sum()), "linear solves": 0}
-    swept = table.get("evaluation_sweeps", pd.Series(dtype=int))
-    solves = 0 if swept.any() else len(swept)  # one a round, if no round was swept
-    return {"evaluation sweeps": int(swept.sum()), "linear solves": solves}
+    by_rows = table.get("kind", pd.Series(dtype=str)) == "evaluation"
+    swept = table.get("evaluation_sweeps", pd.Series(dtype=int)).sum() + by_rows.sum()
+    solves = len(table) if method == SOLVED else 0
+    return {"evaluation sweeps": int(swept), "linear solves": solves}
 
 
 def progress(mdp: MDP) -> dict[str, pd.DataFrame]:
@@ -374,7 +375,7 @@ def progress(mdp: MDP) -> dict[str, pd.DataFrame]:
     """
     V_star = value_iteration(mdp, gamma=GAMMA, tolerance=1e-12).V
     by_value = q_value_iteration(mdp, gamma=GAMMA, threshold=THRESHOLD).table
-    by_policy = policy_iteration(mdp, gamma=GAMMA, evaluation_threshold=THRESHOLD).table
+    by_policy = policy_iteration_by_sweeps(mdp, gamma=GAMMA, threshold=THRESHOLD).table
     tables = islice(sweeps(mdp, GAMMA), len(by_value))
     errors = [np.abs(Q.max(axis=1) - V_star).max() for Q in tables]
     states, V, policy_errors = np.arange(mdp.n_states), np.zeros(mdp.n_states), []
