@@ -43,7 +43,6 @@ from rl_core.worlds.discretise import (
     GriddedTask,
     action_levels,
     make_grid,
-    task_of,
 )
 from rl_core.worlds.environments import (
     BYTE,
@@ -52,6 +51,7 @@ from rl_core.worlds.environments import (
     World,
     open_world,
     opened,
+    task_of,
 )
 from rl_core.worlds.episodes import (
     AnyActor,

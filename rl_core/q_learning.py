@@ -44,8 +44,8 @@ from rl_core.mdp import MDP
 from rl_core.planning import optimal_actions, value_iteration
 from rl_core.training import Failure, Progress, Run
 from rl_core.worlds import tabular
-from rl_core.worlds.discretise import Discretised, GriddedTask, checked_bins, gridded, task_of
-from rl_core.worlds.environments import EnvironmentLike, one_seed_of
+from rl_core.worlds.discretise import Discretised, GriddedTask, checked_bins, gridded
+from rl_core.worlds.environments import EnvironmentLike, one_seed_of, task_of
 from rl_core.worlds.tabular import DiscreteWorld, Draws, Played, start, step
 
 NO_LIMIT = 2**62

@@ -106,8 +106,8 @@ class GymnasiumWorld:
         self._environment = environment
         self._space, self._actions = observations, actions
         # What is written as it came; -1: it has to be flattened or scaled first.
-        self._length = self.n_observations if len(observations.shape) == 1 else -1
-        self._length = -1 if self.as_bytes else self._length
+        flat = len(observations.shape) == 1 and not self.as_bytes
+        self._length = self.n_observations if flat else -1
         self._owned = owned
         self._seed: int | None = None
         self._steps = 0
@@ -301,11 +301,9 @@ def open_world(env: EnvironmentLike) -> World:
     >>> open_world("Acrobot-v1").n_actions
     3
     """
-    if isinstance(env, str) and (task := twin(env)) is not None:
+    task = task_of(env)
+    if task is not None:
         return TaskWorld(task)
-    found: Any = find(env) if isinstance(env, str) else env
-    if isinstance(found, Task):
-        return TaskWorld(found)
     made = opened(env)
     try:
         return GymnasiumWorld(made, owned=made is not env)
@@ -313,6 +311,19 @@ def open_world(env: EnvironmentLike) -> World:
         if made is not env:
             made.close()
         raise
+
+
+def task_of(env: object) -> Task | None:
+    """Return the compiled task that `env` is or names, if there is one.
+
+    Examples
+    --------
+    >>> from rl_core.worlds.environments import task_of
+    >>> task_of("FrozenLake-v1") is None
+    True
+    """
+    found = (twin(env) or find(env)) if isinstance(env, str) else env
+    return found if isinstance(found, Task) else None
 
 
 def opened(env: Any) -> gymnasium.Env[Any, Any]:
