@@ -112,15 +112,9 @@ def number(
 
 def _range(low: float, high: float, above: float, below: float) -> str:
     """Say in words which numbers are meant."""
-    parts = []
-    if math.isfinite(low):
-        parts.append(f"from {low:g}")
-    if math.isfinite(above):
-        parts.append(f"above {above:g}")
-    if math.isfinite(high):
-        parts.append(f"to {high:g}" if math.isfinite(low) else f"up to {high:g}")
-    if math.isfinite(below):
-        parts.append(f"below {below:g}")
+    upto = "to" if math.isfinite(low) else "up to"
+    bounds = {"from": low, "above": above, upto: high, "below": below}
+    parts = [f"{word} {bound:g}" for word, bound in bounds.items() if math.isfinite(bound)]
     bounded = math.isfinite(max(low, above)) and math.isfinite(min(high, below))
     return " ".join(["a number" if bounded else "a finite number", *parts])
 

@@ -10,6 +10,7 @@ import hashlib
 import importlib
 import json
 import math
+import pkgutil
 import sys
 from collections.abc import Mapping
 from functools import reduce
@@ -102,12 +103,12 @@ def describe(value: object, name: str = "config", modules: set[str] | None = Non
     if isinstance(value, np.generic):
         value = value.item()
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        module, _, path = _place(name, type(value), modules)
+        place = _place(name, type(value), modules)
         fields = {
             field.name: describe(getattr(value, field.name), f"{name}.{field.name}", modules)
             for field in dataclasses.fields(value)
         }
-        return {"class": path, "from": module, **fields}  # no field can be called so
+        return {"class": place["import"], "from": place["from"], **fields}  # no field's names
     if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
         return {key: describe(item, f"{name}[{key!r}]", modules) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -117,19 +118,18 @@ def describe(value: object, name: str = "config", modules: set[str] | None = Non
     if value is None or isinstance(value, bool | int | str):
         return value
     if callable(value) and hasattr(value, "__qualname__"):
-        module, _, path = _place(name, value, modules)
-        return {"import": path, "from": module}
+        return _place(name, value, modules)
     raise TypeError(
         f"{name} must be made of dataclasses, lists, tuples, dicts with string keys, classes, "
         f"functions, str, int, float, bool and None, got {value!r} of type {type(value).__name__}"
     )
 
 
-def _place(name: str, thing: object, modules: set[str] | None) -> tuple[str, str, str]:
-    module, colon, path = import_path(name, thing).partition(":")
+def _place(name: str, thing: object, modules: set[str] | None) -> dict[str, str]:
+    module, _, path = import_path(name, thing).partition(":")
     if modules is not None:
         modules.add(module)
-    return module, colon, path
+    return {"import": path, "from": module}
 
 
 def restored(described: Any) -> Any:
@@ -190,12 +190,9 @@ def imported(name: str, path: object) -> Any:
     if module == "__main__":
         raise ValueError(f"{allowed}; put it into a module of its own, where workers find it")
     try:
-        found = importlib.import_module(module)
-        for part in attribute.split("."):
-            found = getattr(found, part)
+        return pkgutil.resolve_name(path)
     except Exception as error:  # importing runs a module's code, which may raise anything
         raise ValueError(f"{allowed} ({error})") from error
-    return found
 
 
 def code_behind(path: str) -> str:
