@@ -448,7 +448,8 @@ def _learn(
             return k
         on_trial = (k + 1) % task.trial_every == 0
         if on_trial or task.gamma < 1.0:
-            appraisal.write_loss(record, k, Q, yardstick, task.gamma, known)
+            lost = appraisal.value_lost(Q, yardstick, task.gamma, known)
+            record[k, appraisal.VALUE_LOST] = lost
         if on_trial:
             trials = np.empty((task.trial_episodes, 2))
             for i in range(task.trial_episodes):

@@ -184,11 +184,8 @@ def best_first(
                     tail += 1
                 else:
                     heapq.heappush(heap, (-value, before))
-    for s in range(n_states):
-        if not settled[s]:
-            V[s] = 0.0
-            order[n_settled] = s
-            n_settled += 1
+    rest = np.flatnonzero(~settled)
+    V[rest], order[n_settled:] = 0.0, rest
 
 
 @compiled
