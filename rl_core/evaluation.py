@@ -87,7 +87,7 @@ Measure = Callable[[NDArray[np.float32], NDArray[np.float32], NDArray[np.float64
 Spaces = tuple[spaces.Space[Any], spaces.Space[Any]]
 """What is observed and what is done."""
 
-FORMAT = "rl_core agent 1"
+FORMAT = "rl_core agent 2"
 
 
 @dataclass(frozen=True)
