@@ -21,7 +21,7 @@ from numba.extending import overload
 from numpy import copyto
 from numpy.typing import NDArray
 
-from rl_core.checks import distinct_seeds
+from rl_core.checks import distinct_seeds, instance
 from rl_core.kernels.arrays import F32
 from rl_core.kernels.compiled import inlined
 from rl_core.worlds.names import Make, find, make_environment
@@ -350,12 +350,9 @@ def opened(env: Any) -> gymnasium.Env[Any, Any]:
             raise TypeError(
                 f"env must be a function without arguments, got {env!r}: {error}"
             ) from (error)
-    if not isinstance(made, gymnasium.Env):
-        raise TypeError(
-            "env must be a Gymnasium id, an import path, a task, an environment or a function that "
-            f"makes one, got {env!r}"
-        )
-    return made
+    allowed = "a Gymnasium id, an import path, a task, an environment or a function that makes one"
+    found: gymnasium.Env[Any, Any] = instance("env", made, gymnasium.Env, allowed)
+    return found
 
 
 def one_seed_of(env: object, seeds: Iterable[int]) -> tuple[int, ...]:

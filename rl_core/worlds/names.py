@@ -145,13 +145,11 @@ def check_elsewhere(env: EnvironmentName, modules: Iterable[str]) -> None:
     program = f"import gymnasium, {', '.join(modules)}\ngymnasium.spec({name!r})"
     path = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     known = subprocess.run([sys.executable, "-c", program], env=path, capture_output=True)
-    require(
-        known.returncode == 0,
-        "env",
-        name,
+    allowed = (
         "known to workers, which import modules but run no notebook or script: register it in a "
-        f"module and say 'module:{name}', or name its class as 'module:Class'",
+        f"module and say 'module:{name}', or name its class as 'module:Class'"
     )
+    require(known.returncode == 0, "env", name, allowed)
 
 
 def make_environment(env: EnvironmentName) -> gymnasium.Env[Any, Any]:
@@ -170,11 +168,9 @@ def make_environment(env: EnvironmentName) -> gymnasium.Env[Any, Any]:
     >>> make_environment("CartPole-v1").action_space.n
     np.int64(2)
     """
-    instance("env", env, EnvironmentName, "a Gymnasium id, a Make or an import path")
-    found = find(env)
+    named, found = _as_make(env), find(env)
     try:
         if found is None:
-            named = _as_make(env)
             return gymnasium.make(named.id, disable_env_checker=True, **named.arguments)
         made = found() if callable(found) else found
     except gymnasium.error.UnregisteredEnv as error:
@@ -209,14 +205,11 @@ def identity(env: EnvironmentName) -> dict[str, Any]:
     >>> "rl_core.maze" in identity("rl_core/Maze-v0")["code"]
     True
     """
-    instance("env", env, EnvironmentName, "a Gymnasium id, a Make or an import path")
-    if find(env) is not None:
-        assert isinstance(env, str)
-        module = env.rpartition(":")[0]
-        if not sources.code([module]):
-            raise ValueError(f"env must name something in a Python source file, got {env!r}")
-        return {"path": env, "code": sources.code([module])}
     named = _as_make(env)
+    if find(env) is not None:
+        code = sources.code([named.id.rpartition(":")[0]])
+        require(code, "env", env, "something in a Python source file")
+        return {"path": env, "code": code}
     where, modules = f"env {named.id!r}", {named.id.rpartition(":")[0]}
     spec = _registered(named.id)
     registration = vars(spec) | {
@@ -233,6 +226,7 @@ def identity(env: EnvironmentName) -> dict[str, Any]:
 
 
 def _as_make(env: EnvironmentName) -> Make:
+    instance("env", env, EnvironmentName, "a Gymnasium id, a Make or an import path")
     return env if isinstance(env, Make) else Make(env)
 
 
