@@ -37,8 +37,8 @@ from rl_core.policies import MLP, Categorical, Gaussian, make_policy
 from rl_core.q_learning import QLearningConfig
 from rl_core.reinforce import ReinforceConfig
 from rl_core.worlds import environments, episodes
-from rl_core.worlds.discretise import Grid, action_levels, make_grid, task_of
-from rl_core.worlds.environments import EnvironmentLike, GymnasiumWorld, World
+from rl_core.worlds.discretise import Grid, action_levels, make_grid
+from rl_core.worlds.environments import EnvironmentLike, GymnasiumWorld, World, task_of
 from rl_core.worlds.episodes import AnyActor, ModuleActor, TableActor, Trajectory, play_episode
 from rl_core.worlds.names import Make, find
 from rl_core.worlds.twins import twin
@@ -62,7 +62,7 @@ Measure = Callable[[NDArray[np.float32], NDArray[np.float32], NDArray[np.float64
 Spaces = tuple[spaces.Space[Any], spaces.Space[Any]]
 """What is observed and what is done."""
 
-FORMAT = "rl_core agent 1"
+FORMAT = "rl_core agent 2"
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import hashlib
 import importlib
 import json
 import math
+import pkgutil
 import sys
 from collections.abc import Mapping
 from functools import reduce
@@ -97,17 +98,16 @@ def describe(value: object, name: str = "config", modules: set[str] | None = Non
     >>> from rl_core.identity import describe
     >>> from rl_core.training import Failure
     >>> describe(Failure(seed=3, episode=1, reason="NaN"))["class"]
-    'Failure'
+    'rl_core.training:Failure'
     """
     if isinstance(value, np.generic):
         value = value.item()
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        module, _, path = _place(name, type(value), modules)
         fields = {
             field.name: describe(getattr(value, field.name), f"{name}.{field.name}", modules)
             for field in dataclasses.fields(value)
         }
-        return {"class": path, "from": module, **fields}  # no field can be called so
+        return {"class": _place(name, type(value), modules), **fields}  # no field's name
     if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
         return {key: describe(item, f"{name}[{key!r}]", modules) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -117,19 +117,18 @@ def describe(value: object, name: str = "config", modules: set[str] | None = Non
     if value is None or isinstance(value, bool | int | str):
         return value
     if callable(value) and hasattr(value, "__qualname__"):
-        module, _, path = _place(name, value, modules)
-        return {"import": path, "from": module}
+        return {"import": _place(name, value, modules)}
     raise TypeError(
         f"{name} must be made of dataclasses, lists, tuples, dicts with string keys, classes, "
         f"functions, str, int, float, bool and None, got {value!r} of type {type(value).__name__}"
     )
 
 
-def _place(name: str, thing: object, modules: set[str] | None) -> tuple[str, str, str]:
-    module, colon, path = import_path(name, thing).partition(":")
+def _place(name: str, thing: object, modules: set[str] | None) -> str:
+    path = import_path(name, thing)
     if modules is not None:
-        modules.add(module)
-    return module, colon, path
+        modules.add(path.partition(":")[0])
+    return path
 
 
 def restored(described: Any) -> Any:
@@ -152,13 +151,13 @@ def restored(described: Any) -> Any:
     if not isinstance(described, dict):
         return described
     if "class" in described:
-        kind = imported("config", f"{described['from']}:{described['class']}")
+        kind = imported("config", described["class"])
         if not (isinstance(kind, type) and dataclasses.is_dataclass(kind)):
             raise TypeError(f"config must be described by dataclasses, got {kind!r}")
         given = [field.name for field in dataclasses.fields(kind) if field.init]
         return kind(**{name: restored(described[name]) for name in given})
     if "import" in described:
-        return imported("config", f"{described['from']}:{described['import']}")
+        return imported("config", described["import"])
     if "float" in described:
         return float(described["float"])
     return {name: restored(item) for name, item in described.items()}
@@ -190,12 +189,9 @@ def imported(name: str, path: object) -> Any:
     if module == "__main__":
         raise ValueError(f"{allowed}; put it into a module of its own, where workers find it")
     try:
-        found = importlib.import_module(module)
-        for part in attribute.split("."):
-            found = getattr(found, part)
+        return pkgutil.resolve_name(path)
     except Exception as error:  # importing runs a module's code, which may raise anything
         raise ValueError(f"{allowed} ({error})") from error
-    return found
 
 
 def code_behind(path: str) -> str:

@@ -213,8 +213,8 @@ def value_iteration(
     gamma, transitions, reward = _opened(mdp, gamma)
     tolerance = checks.positive("tolerance", tolerance)
     Q, V, policy = _blank(mdp)
-    magnitude = sweeps.expected_rewards(transitions, reward, Q)  # Q is r(s, a) for now
-    bounds.check_returns("mdp", magnitude, gamma)
+    magnitude = _largest(reward, gamma)
+    sweeps.lookahead(transitions, reward, gamma, V, Q)  # V is 0, so that Q is r(s, a) for now
     bound = error_bound(magnitude, gamma, rounding_error(mdp.n_successors, magnitude))
     record = _Record("value iteration", progress)
     if bound > tolerance:  # else V = 0 will do

@@ -44,8 +44,8 @@ from rl_core.mdp import MDP
 from rl_core.planning import optimal_actions
 from rl_core.training import Failure, Progress, Run
 from rl_core.worlds import tabular
-from rl_core.worlds.discretise import Discretised, checked_bins, gridded, task_of
-from rl_core.worlds.environments import EnvironmentLike, one_seed_of
+from rl_core.worlds.discretise import Discretised, checked_bins, gridded
+from rl_core.worlds.environments import EnvironmentLike, one_seed_of, task_of
 from rl_core.worlds.tabular import DiscreteWorld, Draws, Played, start, step
 
 NO_LIMIT = 2**62
@@ -360,7 +360,8 @@ def _learn(
             return k
         on_trial = (k + 1) % task.trial_every == 0
         if on_trial or task.gamma < 1.0:
-            appraisal.write_loss(record, k, Q, yardstick, task.gamma, known)
+            lost = appraisal.value_lost(Q, yardstick, task.gamma, known)
+            record[k, appraisal.VALUE_LOST] = lost
         if on_trial:
             trials = np.empty((task.trial_episodes, 2))
             for i in range(task.trial_episodes):

@@ -110,11 +110,8 @@ def _remember(name: str, spec: ModuleSpec | None) -> None:
 
 def is_project(module: str) -> bool:
     """Whether a module's package is neither Python's own nor installed: someone works on it."""
-    top = _top(module)
-    if top in sys.stdlib_module_names:
-        return False
     try:
-        spec = importlib.util.find_spec(top)
+        spec = importlib.util.find_spec(_top(module))
     except ValueError:  # it has no spec
         return False
     return spec is not None and _outside(spec)

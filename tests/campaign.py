@@ -245,7 +245,7 @@ CALLS: dict[str, Callable[[], dict[str, Any]]] = {
     "worlds.discretise.checked_bins": lambda: {"name": "bins", "bins": 3},
     "worlds.discretise.gridded": lambda: {"env": "MountainCar-v0", "bins": 3, "levels": None},
     "worlds.discretise.make_grid": lambda: {"space": BOX, "bins": 3, "low": None, "high": None},
-    "worlds.discretise.task_of": lambda: {"env": "MountainCar-v0"},
+    "worlds.environments.task_of": lambda: {"env": "MountainCar-v0"},
     "worlds.environments.checked_reward": lambda: {"env": "here", "reward": 1.0},
     "worlds.environments.one_seed_of": lambda: {"env": "MountainCar-v0", "seeds": [0]},
     "worlds.environments.open_world": lambda: {"env": "MountainCar-v0"},

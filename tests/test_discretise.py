@@ -21,8 +21,8 @@ from rl_core.worlds.discretise import (
     checked_bins,
     gridded,
     make_grid,
-    task_of,
 )
+from rl_core.worlds.environments import task_of
 from rl_core.worlds.tasks import task
 
 BOX = spaces.Box(np.array([-1.0, 0.0], np.float32), np.array([1.0, 3.0], np.float32))

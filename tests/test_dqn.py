@@ -25,7 +25,7 @@ from rl_core.experiments import run as run_arms
 from rl_core.exploration import HalfWay, Linear, schedule_state
 from rl_core.kernels import networks
 from rl_core.kernels.q_update import STEPS, UPDATES, Settings, make_learner
-from rl_core.kernels.replay import bytes_a_transition, make_memory
+from rl_core.kernels.replay import make_memory
 from rl_core.policies import MLP, Module
 from rl_core.training import spawn_streams, weights_of
 from rl_core.worlds.environments import TaskWorld, open_world
@@ -667,7 +667,9 @@ def test_bytes_are_learned_from_as_the_same_numbers_are(engine):
 
 
 def test_memory_of_bytes_takes_a_quarter():
-    room, as_floats = (bytes_a_transition(84 * 84, as_bytes=it) for it in (True, False))
+    room, as_floats = (
+        sum(array.nbytes for array in make_memory(10, 84 * 84, as_bytes=it)) for it in (True, False)
+    )
     assert as_floats / room == pytest.approx(4, abs=0.01)
 
 

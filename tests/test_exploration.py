@@ -165,7 +165,7 @@ def test_values_are_a_number_an_episode_whatever_number_was_given(epsilon):
 )
 def test_rules_can_be_written_as_json_and_told_apart(rule):
     json.dumps(dataclasses.asdict(rule))
-    assert describe(rule)["class"] == type(rule).__name__
+    assert describe(rule)["class"] == f"rl_core.exploration:{type(rule).__name__}"
     assert "kind" not in dataclasses.asdict(rule)
 
 

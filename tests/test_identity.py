@@ -91,8 +91,8 @@ def test_what_cannot_be_told_apart_is_refused(value, message):
 def test_classes_and_functions_are_named_by_where_they_are():
     modules = set()
     assert describe([canonical_json, Greedy], modules=modules) == [
-        {"import": "canonical_json", "from": "rl_core.identity"},
-        {"import": "Greedy", "from": __name__},
+        {"import": "rl_core.identity:canonical_json"},
+        {"import": f"{__name__}:Greedy"},
     ]
-    assert describe(Config(), modules=modules)["rule"]["from"] == __name__
+    assert describe(Config(), modules=modules)["rule"]["class"].startswith(f"{__name__}:")
     assert modules == {"rl_core.identity", __name__}

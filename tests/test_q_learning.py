@@ -794,4 +794,4 @@ def test_the_configuration_can_be_written_as_json():
         step_size=VisitDecay(), exploration=EpsilonGreedy(Linear(1, 0.1, episodes=9))
     )
     assert json.loads(json.dumps(dataclasses.asdict(config)))["step_size"]["exponent"] == 0.6
-    assert describe(config)["exploration"]["epsilon"]["class"] == "Linear"
+    assert describe(config)["exploration"]["epsilon"]["class"] == "rl_core.exploration:Linear"

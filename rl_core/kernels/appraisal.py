@@ -36,7 +36,7 @@ COLUMNS = {
     "eval_steps": np.float64,
 }
 _STEPS, RETURN, _TERMINATED, _ENV_STEPS, _VISITED, _NORM, _RMSE, _RMSE_VISITABLE = range(8)
-_OPTIMAL, _VALUE_LOST, _EVAL_RETURN, _EVAL_STEPS = range(8, 12)
+_OPTIMAL, VALUE_LOST, _EVAL_RETURN, _EVAL_STEPS = range(8, 12)
 
 
 class Yardstick(NamedTuple):
@@ -111,27 +111,6 @@ def new_appraisal(yardstick: Yardstick) -> Appraisal:
     )
 
 
-class Errors(NamedTuple):
-    """The measures that are cheap enough for every episode; NaN where the yardstick lacks.
-
-    Attributes
-    ----------
-    norm : float
-        The Frobenius norm of Q - Q*.
-    rmse : float
-        The root of the mean squared error over all entries, norm / sqrt(S A).
-    rmse_visitable : float
-        The same over the entries of visitable states.
-    optimal_states : float
-        Visitable states in which every greedy action is optimal.
-    """
-
-    norm: float
-    rmse: float
-    rmse_visitable: float
-    optimal_states: float
-
-
 def empty_record(n_seeds: int, episodes: int) -> F64:
     """Return the record that a learner fills: float64 of shape (seeds, episodes, columns).
 
@@ -194,14 +173,6 @@ def write_episode(
 
 
 @compiled
-def write_loss(
-    record: F64, k: int, Q: F64, yardstick: Yardstick, gamma: float, appraisal: Appraisal
-) -> None:
-    """Add to the row of episode k the value that the greedy policy loses."""
-    record[k, _VALUE_LOST] = value_lost(Q, yardstick, gamma, appraisal)
-
-
-@compiled
 def write_evaluation(record: F64, k: int, trials: F64) -> None:
     """Add to the row of episode k the evaluation's mean return and steps.
 
@@ -212,8 +183,19 @@ def write_evaluation(record: F64, k: int, trials: F64) -> None:
 
 
 @compiled
-def errors(Q: F64, yardstick: Yardstick) -> Errors:
-    """Measure Q, float64 of shape (S, A), in one pass.
+def errors(Q: F64, yardstick: Yardstick) -> tuple[float, float, float, float]:
+    """Measure Q, float64 of shape (S, A), in one pass; NaN where the yardstick lacks.
+
+    Returns
+    -------
+    norm : float
+        The Frobenius norm of Q - Q*.
+    rmse : float
+        The root of the mean squared error over all entries, norm / sqrt(S A).
+    rmse_visitable : float
+        The same over the entries of visitable states.
+    optimal_states : float
+        Visitable states in which every greedy action is optimal.
 
     Examples
     --------
@@ -222,12 +204,13 @@ def errors(Q: F64, yardstick: Yardstick) -> Errors:
     >>> from rl_core.maze import Maze
     >>> from rl_core.q_learning import make_yardstick
     >>> yardstick = make_yardstick(Maze().model(), np.ones((112, 4)), (112, 4))
-    >>> errors(np.zeros((112, 4)), yardstick).rmse
+    >>> norm, rmse, rmse_visitable, optimal_states = errors(np.zeros((112, 4)), yardstick)
+    >>> rmse
     1.0
     """
     Q_star, optimal, visitable = yardstick.Q_star, yardstick.optimal, yardstick.visitable
     if len(Q_star) == 0:
-        return Errors(math.nan, math.nan, math.nan, math.nan)
+        return math.nan, math.nan, math.nan, math.nan
     n_states, n_actions = Q.shape
     total = total_visitable = 0.0
     n_visitable, n_optimal = 0, 0.0
@@ -246,8 +229,8 @@ def errors(Q: F64, yardstick: Yardstick) -> Errors:
             n_optimal += 1.0 if right else 0.0
     norm, rmse = math.sqrt(total), math.sqrt(total / (n_states * n_actions))
     if n_visitable == 0:
-        return Errors(norm, rmse, math.nan, math.nan)
-    return Errors(norm, rmse, math.sqrt(total_visitable / (n_visitable * n_actions)), n_optimal)
+        return norm, rmse, math.nan, math.nan
+    return norm, rmse, math.sqrt(total_visitable / (n_visitable * n_actions)), n_optimal
 
 
 @compiled

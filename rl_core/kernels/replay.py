@@ -60,18 +60,6 @@ BYTE = np.float32(1 / 255)
 """What a byte of an observation counts."""
 
 
-def bytes_a_transition(n_observations: int, *, as_bytes: bool = False) -> int:
-    """Return the room that a transition takes, in bytes.
-
-    Examples
-    --------
-    >>> from rl_core.kernels.replay import bytes_a_transition, make_memory
-    >>> bytes_a_transition(4), sum(array.nbytes for array in make_memory(1, 4)[:-1])
-    (61, 61)
-    """
-    return sum(array.nbytes for array in make_memory(1, n_observations, as_bytes=as_bytes)[:-1])
-
-
 def check_room(name: str, capacity: int, n_observations: int, as_bytes: bool) -> None:
     """Raise if the machine cannot hold such a memory, whose zeros take no room at first.
 
@@ -80,7 +68,8 @@ def check_room(name: str, capacity: int, n_observations: int, as_bytes: bool) ->
     >>> from rl_core.kernels.replay import check_room
     >>> check_room("memory_size", 3000, 6, False)
     """
-    in_memory(name, capacity, capacity * bytes_a_transition(n_observations, as_bytes=as_bytes))
+    *one, _ = make_memory(1, n_observations, as_bytes=as_bytes)
+    in_memory(name, capacity, capacity * sum(array.nbytes for array in one))
 
 
 def make_memory(capacity: int, n_observations: int, *, as_bytes: bool = False) -> Memory:
@@ -135,26 +124,14 @@ def scaled(kept: NDArray[Any]) -> F32:
     return kept if kept.dtype != np.uint8 else kept * BYTE
 
 
-@compiled
 def _keep_floats(room: NDArray[Any], observation: F32) -> None:
     for i in range(observation.size):
         room[i] = observation[i]
 
 
-@compiled
 def _keep_bytes(room: NDArray[Any], observation: F32) -> None:
     for i in range(observation.size):
         room[i] = np.uint8(observation[i] / BYTE + np.float32(0.5))
-
-
-# What it means in compiled code is decided by the type of what is kept.
-overload(keep)(
-    lambda room, observation: (
-        (lambda room, observation: _keep_bytes(room, observation))
-        if room.dtype is uint8
-        else (lambda room, observation: _keep_floats(room, observation))
-    )
-)
 
 
 def number(kept: Any, slot: int, i: int) -> float:
@@ -162,6 +139,10 @@ def number(kept: Any, slot: int, i: int) -> float:
     return float(scaled(kept[slot, i : i + 1])[0])
 
 
+# What it means in compiled code is decided by the type of what is kept.
+overload(keep, strict=False)(
+    lambda room, observation: _keep_bytes if room.dtype is uint8 else _keep_floats
+)
 overload(number)(
     lambda kept, slot, i: (
         (lambda kept, slot, i: kept[slot, i] * BYTE)

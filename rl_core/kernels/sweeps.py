@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rl_core.kernels.arrays import F64, I32, I64, Bools, Ints
-from rl_core.kernels.compiled import compiled
+from rl_core.kernels.compiled import compiled, inlined
 
 TIE = 1e-10
 """Actions whose values differ by less than this fraction of the state's largest |Q| are tied: it is
@@ -56,6 +56,12 @@ def transitions(successor: I32, probability: F64) -> Transitions:
     return Transitions(np.ascontiguousarray(successor), rows, int(not shared))
 
 
+@inlined
+def _noted(largest: float, squares: float, change: float) -> tuple[float, float]:
+    """Take one more change into the largest and the sum of squares."""
+    return max(largest, change), squares + change * change
+
+
 @compiled
 def lookahead(
     transitions: Transitions, reward: F64, gamma: float, V: F64, Q: F64
@@ -71,9 +77,7 @@ def lookahead(
                 q += probability[own_rows * s, a, k] * (
                     reward[s, a, k] + gamma * V[successor[s, a, k]]
                 )
-            change = abs(q - Q[s, a])
-            largest = max(largest, change)
-            squares += change * change
+            largest, squares = _noted(largest, squares, abs(q - Q[s, a]))
             Q[s, a] = q
     return largest, squares
 
@@ -95,29 +99,11 @@ def greedy(Q: F64, V: F64, policy: Ints) -> tuple[float, float, int]:
         chosen = 0
         while Q[s, chosen] < best - TIE * scale:
             chosen += 1
-        change = abs(best - V[s])
-        largest = max(largest, change)
-        squares += change * change
+        largest, squares = _noted(largest, squares, abs(best - V[s]))
         changes += policy[s] != chosen
         V[s] = best
         policy[s] = chosen
     return largest, squares, changes
-
-
-@compiled
-def expected_rewards(transitions: Transitions, reward: F64, r: F64) -> float:
-    """Write r(s, a) = Σ_k p_k r_k; return the largest |r_k|."""
-    _, probability, own_rows = transitions
-    n_states, n_actions, n_successors = reward.shape
-    largest = 0.0
-    for s in range(n_states):
-        for a in range(n_actions):
-            mean = 0.0
-            for k in range(n_successors):
-                largest = max(largest, abs(reward[s, a, k]))
-                mean += probability[own_rows * s, a, k] * reward[s, a, k]
-            r[s, a] = mean
-    return largest
 
 
 @compiled
@@ -198,11 +184,8 @@ def best_first(
                     tail += 1
                 else:
                     heapq.heappush(heap, (-value, before))
-    for s in range(n_states):
-        if not settled[s]:
-            V[s] = 0.0
-            order[n_settled] = s
-            n_settled += 1
+    rest = np.flatnonzero(~settled)
+    V[rest], order[n_settled:] = 0.0, rest
 
 
 @compiled
@@ -235,6 +218,29 @@ def in_order(
     return Transitions(_renumbered(successor, order), ordered, own_rows)
 
 
+@inlined
+def _worth(
+    transitions: Transitions, led: I32, r: F64, gamma: float, V: F64, s: int, a: int, i: int
+) -> float:
+    """Return q = (r + γ Σ_{s' ≠ s} p V(s')) / (1 - γ l), where l is the probability to stay in s.
+
+    That is what taking a until s is left is worth: a wall bumped into need not be swept again and
+    again. The states that a may lead to are `led[s, i]`.
+    """
+    q: float = r[s, a]
+    stay = 0.0
+    for k in range(led.shape[2]):
+        p = transitions.probability[transitions.own_rows * s, a, k]
+        following = led[s, i, k]
+        if following == s:
+            stay += p
+        else:
+            q += gamma * p * V[following]
+    if stay > 0.0:
+        q /= 1.0 - gamma * stay
+    return q
+
+
 @compiled
 def improvement_sweep(
     transitions: Transitions,
@@ -245,32 +251,21 @@ def improvement_sweep(
     chosen: I32,
     backward: bool,
 ) -> tuple[float, float, int, float]:
-    """Set V(s) = max_a q(s, a) in place, state after state, and note the action and successors.
+    """Set V(s) = max_a q(s, a) in place (`_worth`), and note the action and its successors.
 
-    With l the probability of staying in s, q = (r + γ Σ_{s' ≠ s} p V(s')) / (1 - γ l) is what
-    taking a until s is left is worth: a wall bumped into need not be swept again and again.
     An action is kept while it ties with the best (`TIE`). `backward` turns the order round.
 
     Returns the largest change, the sum of squared changes, the number of actions changed, and
     the largest |V|.
     """
-    successor, probability, own_rows = transitions
+    successor = transitions.successor
     n_states, n_actions, n_successors = successor.shape
     largest, squares, changes, magnitude = 0.0, 0.0, 0, 0.0
     for i in range(n_states):
         s = n_states - 1 - i if backward else i
         best, best_action, kept = -np.inf, 0, -np.inf
         for a in range(n_actions):
-            q, stay = r[s, a], 0.0
-            for k in range(n_successors):
-                p = probability[own_rows * s, a, k]
-                following = successor[s, a, k]
-                if following == s:
-                    stay += p
-                else:
-                    q += gamma * p * V[following]
-            if stay > 0.0:
-                q /= 1.0 - gamma * stay
+            q = _worth(transitions, successor, r, gamma, V, s, a, a)
             if q > best:
                 best, best_action = q, a
             if a == policy[s]:
@@ -280,9 +275,7 @@ def improvement_sweep(
             policy[s] = best_action
             for k in range(n_successors):
                 chosen[s, k] = successor[s, best_action, k]
-        change = abs(best - V[s])
-        largest = max(largest, change)
-        squares += change * change
+        largest, squares = _noted(largest, squares, abs(best - V[s]))
         magnitude = max(magnitude, abs(best))
         V[s] = best
     return largest, squares, changes, magnitude
@@ -296,23 +289,11 @@ def evaluation_sweep(
 
     Returns the largest change and the sum of squared changes.
     """
-    _, probability, own_rows = transitions
     n_states, n_successors = chosen.shape
+    led = chosen.reshape(n_states, 1, n_successors)
     largest, squares = 0.0, 0.0
     for s in range(n_states):
-        a = policy[s]
-        q, stay = r[s, a], 0.0
-        for k in range(n_successors):
-            p = probability[own_rows * s, a, k]
-            following = chosen[s, k]
-            if following == s:
-                stay += p
-            else:
-                q += gamma * p * V[following]
-        if stay > 0.0:
-            q /= 1.0 - gamma * stay
-        change = abs(q - V[s])
-        largest = max(largest, change)
-        squares += change * change
+        q = _worth(transitions, led, r, gamma, V, s, policy[s], 0)
+        largest, squares = _noted(largest, squares, abs(q - V[s]))
         V[s] = q
     return largest, squares

@@ -73,12 +73,8 @@ def _observe_start(state: State, observation: Observation) -> None:
     observation[4:] = state[2:]
 
 
-def _compiled_observe_start(state: State, observation: Observation) -> object:
-    """No other library rounds like numpy's single precision cosine: round the double one."""
-    return _observe
-
-
-overload(_observe_start)(_compiled_observe_start)
+# No other library rounds like numpy's single precision cosine: compiled code rounds the double one.
+overload(_observe_start, strict=False)(lambda state, observation: _observe)
 
 
 @task(

@@ -35,10 +35,9 @@ from rl_core.worlds.environments import (
     native_action,
     observed,
     opened,
+    task_of,
 )
-from rl_core.worlds.names import find
 from rl_core.worlds.tasks import Kernel, Task
-from rl_core.worlds.twins import twin
 
 MAX_CELLS, MAX_ACTIONS = 2**31 - 1, 2**16
 
@@ -104,15 +103,13 @@ def make_grid(
     bounds = []
     for name, given, own in (("low", low, space.low), ("high", high, space.high)):
         bound = floats(name, np.ravel(own) if given is None else given, (d,), finite=False)
-        finite = bool(np.isfinite(bound).all())
+        finite = np.isfinite(bound).all()
         require(finite, name, bound.tolist(), "finite in every dimension; give bounds to use")
         bounds.append(bound)
     with np.errstate(over="ignore"):
         width = bounds[1] - bounds[0]
-    apart = bool(((width > 0) & (width < np.inf)).all())
-    require(
-        apart, "low", bounds[0].tolist(), f"below high, {bounds[1].tolist()}, by a finite width"
-    )
+    allowed = f"below high, {bounds[1].tolist()}, by a finite width"
+    require(((width > 0) & (width < np.inf)).all(), "low", bounds[0].tolist(), allowed)
     numbers = checked_bins("bins", bins)
     numbers = (numbers,) * d if isinstance(numbers, int) else numbers
     require(len(numbers) == d, "bins", bins, f"a positive integer, or {d} of them")
@@ -199,7 +196,7 @@ def action_levels(space: spaces.Space[Any], levels: int | None) -> F32:
     require(isinstance(space, spaces.Box), "env's action space", space, "Discrete or a Box")
     assert isinstance(space, spaces.Box)
     low, high = space.low.ravel(), space.high.ravel()
-    bounded = bool(np.isfinite(low).all() and np.isfinite(high).all())
+    bounded = np.isfinite([low, high]).all()
     require(bounded, "env's action space", space, "bounded")
     require(levels is not None, "levels", levels, "an integer from 2 where actions are a Box")
     levels = integer("levels", levels, 2)
@@ -253,7 +250,7 @@ class Discretised(gymnasium.Wrapper[Any, Any, Any, Any]):
         made = opened(env)
         self.grid = make_grid(made.observation_space, bins, low=low, high=high)
         self.levels = action_levels(made.action_space, levels)
-        self._native, self._steps = made.action_space, 0
+        self._steps = 0
         super().__init__(made)
         self.observation_space = spaces.Discrete(self.grid.n_cells)
         self.action_space = spaces.Discrete(len(self.levels))
@@ -271,7 +268,7 @@ class Discretised(gymnasium.Wrapper[Any, Any, Any, Any]):
     def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
         """Take the action of this number; see `gymnasium.Env.step`."""
         chosen = self.levels[integer("action", action, 0, len(self.levels) - 1)]
-        taken = native_action(self._native, chosen)
+        taken = native_action(self.env.action_space, chosen)
         self._steps += 1
         observation, reward, terminated, truncated, info = self.env.step(taken)
         reward = checked_reward(self._where(), reward)
@@ -351,35 +348,3 @@ def gridded(
     actions = action_levels(task.action_space, levels)
     seen = np.zeros(task.n_observations, np.float32)
     return GriddedTask(task.kernel(), grid, actions, seen, task.max_episode_steps or 0)
-
-
-def task_of(env: object) -> Task | None:
-    """Return the compiled task that `env` is or names, if there is one.
-
-    Examples
-    --------
-    >>> from rl_core.worlds.discretise import task_of
-    >>> task_of("FrozenLake-v1") is None
-    True
-    """
-    found = (twin(env) or find(env)) if isinstance(env, str) else env
-    return found if isinstance(found, Task) else None
-
-
-@compiled
-def start_gridded(world: GriddedTask, rng: np.random.Generator) -> int:
-    """Draw the start of an episode as the environment's `reset` does; return its cell.
-
-    The acrobot's first observation is here rounded as compiled code rounds a cosine, which may
-    differ from numpy's in the last bit.
-    """
-    world.kernel.start(rng, world.kernel.state, world.observation)
-    return cell(world.grid, world.observation)
-
-
-@compiled
-def step_gridded(world: GriddedTask, a: int) -> tuple[int, float, bool]:
-    """Take action number a; return the next cell, the reward, and whether the goal is reached."""
-    reward, terminated = world.kernel.step(world.kernel.state, world.actions[a])
-    world.kernel.observe(world.kernel.state, world.observation)
-    return cell(world.grid, world.observation), reward, terminated

@@ -21,7 +21,7 @@ from numba.extending import overload
 from numpy import copyto
 from numpy.typing import NDArray
 
-from rl_core.checks import distinct_seeds
+from rl_core.checks import distinct_seeds, instance
 from rl_core.kernels.arrays import F32
 from rl_core.kernels.compiled import inlined
 from rl_core.worlds.names import Make, find, make_environment
@@ -106,8 +106,8 @@ class GymnasiumWorld:
         self._environment = environment
         self._space, self._actions = observations, actions
         # What is written as it came; -1: it has to be flattened or scaled first.
-        self._length = self.n_observations if len(observations.shape) == 1 else -1
-        self._length = -1 if self.as_bytes else self._length
+        flat = len(observations.shape) == 1 and not self.as_bytes
+        self._length = self.n_observations if flat else -1
         self._owned = owned
         self._seed: int | None = None
         self._steps = 0
@@ -301,11 +301,9 @@ def open_world(env: EnvironmentLike) -> World:
     >>> open_world("Acrobot-v1").n_actions
     3
     """
-    if isinstance(env, str) and (task := twin(env)) is not None:
+    task = task_of(env)
+    if task is not None:
         return TaskWorld(task)
-    found: Any = find(env) if isinstance(env, str) else env
-    if isinstance(found, Task):
-        return TaskWorld(found)
     made = opened(env)
     try:
         return GymnasiumWorld(made, owned=made is not env)
@@ -313,6 +311,19 @@ def open_world(env: EnvironmentLike) -> World:
         if made is not env:
             made.close()
         raise
+
+
+def task_of(env: object) -> Task | None:
+    """Return the compiled task that `env` is or names, if there is one.
+
+    Examples
+    --------
+    >>> from rl_core.worlds.environments import task_of
+    >>> task_of("FrozenLake-v1") is None
+    True
+    """
+    found = (twin(env) or find(env)) if isinstance(env, str) else env
+    return found if isinstance(found, Task) else None
 
 
 def opened(env: Any) -> gymnasium.Env[Any, Any]:
@@ -339,12 +350,9 @@ def opened(env: Any) -> gymnasium.Env[Any, Any]:
             raise TypeError(
                 f"env must be a function without arguments, got {env!r}: {error}"
             ) from (error)
-    if not isinstance(made, gymnasium.Env):
-        raise TypeError(
-            "env must be a Gymnasium id, an import path, a task, an environment or a function that "
-            f"makes one, got {env!r}"
-        )
-    return made
+    allowed = "a Gymnasium id, an import path, a task, an environment or a function that makes one"
+    found: gymnasium.Env[Any, Any] = instance("env", made, gymnasium.Env, allowed)
+    return found
 
 
 def one_seed_of(env: object, seeds: Iterable[int]) -> tuple[int, ...]:

@@ -5,7 +5,6 @@ function or class that makes an environment, or of a compiled task. All of them 
 and all of them can be told apart (`identity`).
 """
 
-import dataclasses
 import importlib
 import json
 import os
@@ -138,7 +137,7 @@ def check_elsewhere(env: EnvironmentName, modules: Iterable[str]) -> None:
     ValueError
         With what to do.
     """
-    name = env.id if isinstance(env, Make) else env
+    name = _as_make(env).id
     spec = registry.get(name)
     top = str(getattr(spec, "entry_point", "")).partition(".")[0]
     if spec is None or (name in _FIRST and top in ("gymnasium", "rl_core")):
@@ -146,13 +145,11 @@ def check_elsewhere(env: EnvironmentName, modules: Iterable[str]) -> None:
     program = f"import gymnasium, {', '.join(modules)}\ngymnasium.spec({name!r})"
     path = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     known = subprocess.run([sys.executable, "-c", program], env=path, capture_output=True)
-    require(
-        known.returncode == 0,
-        "env",
-        name,
+    allowed = (
         "known to workers, which import modules but run no notebook or script: register it in a "
-        f"module and say 'module:{name}', or name its class as 'module:Class'",
+        f"module and say 'module:{name}', or name its class as 'module:Class'"
     )
+    require(known.returncode == 0, "env", name, allowed)
 
 
 def make_environment(env: EnvironmentName) -> gymnasium.Env[Any, Any]:
@@ -171,24 +168,20 @@ def make_environment(env: EnvironmentName) -> gymnasium.Env[Any, Any]:
     >>> make_environment("CartPole-v1").action_space.n
     np.int64(2)
     """
-    instance("env", env, EnvironmentName, "a Gymnasium id, a Make or an import path")
-    found = find(env)
-    name, arguments = (env.id, env.arguments) if isinstance(env, Make) else (env, {})
+    named, found = _as_make(env), find(env)
     try:
         if found is None:
-            return gymnasium.make(name, disable_env_checker=True, **arguments)
+            return gymnasium.make(named.id, disable_env_checker=True, **named.arguments)
         made = found() if callable(found) else found
     except gymnasium.error.UnregisteredEnv as error:
         raise ValueError(f"env must be an id that Gymnasium knows, got {env!r}: {error}") from error
     except Exception as error:  # whatever the environment's code raises
         reason = str(error) or type(error).__name__
         raise ValueError(f"env must be one that opens here, got {env!r}: {reason}") from error
-    made_here = isinstance(made, gymnasium.Env) and made is not found
-    allowed = "an import path of something that makes a gymnasium.Env"
-    opened: gymnasium.Env[Any, Any] = instance(
-        "env", made if made_here else env, gymnasium.Env, allowed
-    )
-    return opened
+    if made is found or not isinstance(made, gymnasium.Env):
+        allowed = "an import path of something that makes a gymnasium.Env"
+        raise TypeError(f"env must be {allowed}, got {env!r}")
+    return made
 
 
 def identity(env: EnvironmentName) -> dict[str, Any]:
@@ -212,34 +205,29 @@ def identity(env: EnvironmentName) -> dict[str, Any]:
     >>> "rl_core.maze" in identity("rl_core/Maze-v0")["code"]
     True
     """
-    instance("env", env, EnvironmentName, "a Gymnasium id, a Make or an import path")
+    named = _as_make(env)
     if find(env) is not None:
-        assert isinstance(env, str)
-        module = env.rpartition(":")[0]
-        if not sources.code([module]):
-            raise ValueError(f"env must name something in a Python source file, got {env!r}")
-        return {"path": env, "code": sources.code([module])}
-    name = env.id if isinstance(env, Make) else env
-    spec = _registered(name)
-    where = f"env {name!r}"
-    modules = {name.rpartition(":")[0]}
-    registration = {
-        attribute.name: getattr(spec, attribute.name)
-        for attribute in dataclasses.fields(spec)
-        if attribute.name not in ("entry_point", "vector_entry_point", "additional_wrappers")
+        code = sources.code([named.id.rpartition(":")[0]])
+        require(code, "env", env, "something in a Python source file")
+        return {"path": env, "code": code}
+    where, modules = f"env {named.id!r}", {named.id.rpartition(":")[0]}
+    spec = _registered(named.id)
+    registration = vars(spec) | {
+        "entry_point": _entry(where, spec.entry_point, modules),
+        "vector_entry_point": None,  # it is not used
+        "additional_wrappers": [
+            vars(wrapper) | {"entry_point": _entry(where, wrapper.entry_point, modules)}
+            for wrapper in spec.additional_wrappers
+        ],
     }
-    registration["wrappers"] = [
-        {"name": wrapper.name, "entry_point": _entry(where, wrapper.entry_point, modules),
-         "kwargs": wrapper.kwargs}
-        for wrapper in spec.additional_wrappers
-    ]  # fmt: skip
     described = describe(registration, where, modules)
-    described["entry_point"] = _entry(where, spec.entry_point, modules)
     others = {module for module in modules if module and module.split(".")[0] != "gymnasium"}
-    arguments = dict(env.arguments) if isinstance(env, Make) else {}
-    return {
-        "id": name, "arguments": arguments, "registration": described, "code": sources.code(others)
-    }  # fmt: skip
+    return {**vars(named), "registration": described, "code": sources.code(others)}
+
+
+def _as_make(env: EnvironmentName) -> Make:
+    instance("env", env, EnvironmentName, "a Gymnasium id, a Make or an import path")
+    return env if isinstance(env, Make) else Make(env)
 
 
 def _registered(name: str) -> EnvSpec:

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 from gymnasium import spaces
+from numba.extending import register_jitable
 
-from rl_core.kernels.compiled import compiled
 from rl_core.worlds.tasks import Action, Observation, State, clip, task
 
 _MAX_SPEED = 8.0
@@ -16,7 +16,7 @@ _TURN = 2 * math.pi
 _HIGH = np.array([1.0, 1.0, _MAX_SPEED], np.float32)
 
 
-@compiled
+@register_jitable
 def _observe(state: State, observation: Observation) -> None:
     observation[0] = math.cos(state[0])
     observation[1] = math.sin(state[0])
@@ -65,7 +65,4 @@ class Pendulum:
         state[0] = angle + state[1] * _TIME_STEP
         return -cost, False
 
-    @staticmethod
-    def observe(state: State, observation: Observation) -> None:
-        """Observe cosine and sine of the angle, and the velocity."""
-        _observe(state, observation)
+    observe = staticmethod(_observe)

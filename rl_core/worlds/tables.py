@@ -33,18 +33,13 @@ def read_table(env: gym.Env[Any, Any], start_distribution: ArrayLike | None = No
     table = _table(env)
     n_states, n_actions = len(table), len(table[0])
     start = start_arrays(_start_distribution(env, start_distribution, n_states), n_states)
-    s, a, k, p, following, r, terminated = (
-        np.array(column)
-        for column in zip(
-            *(
-                (s, a, k, float(p), int(following), float(r), bool(terminated))
-                for s, actions in enumerate(table)
-                for a, row in enumerate(actions)
-                for k, (p, following, r, terminated) in enumerate(row)
-            ),
-            strict=True,
-        )
-    )
+    rows = [
+        (s, a, k, float(p), int(following), float(r), bool(terminated))
+        for s, actions in enumerate(table)
+        for a, row in enumerate(actions)
+        for k, (p, following, r, terminated) in enumerate(row)
+    ]
+    s, a, k, p, following, r, terminated = map(np.array, zip(*rows, strict=True))
     possible, moves = p > 0, following != s
     absorbs, ends, goes_on = np.ones(n_states, np.bool_), *np.zeros((2, n_states), np.bool_)
     absorbs[s[possible & (moves | (r != 0))]] = False
@@ -133,19 +128,12 @@ def _check_row(row: list[Any], n_states: int, where: str, malformed: str) -> Non
 
 def _is_transition(transition: object, n_states: int) -> bool:
     """Say whether it is (probability, next state, reward, terminated), with values that can be."""
-    if not isinstance(transition, tuple | list) or len(transition) != 4:
-        return False
-    probability, following, reward, terminated = transition
-    return (
-        isinstance(probability, Real)
-        and 0 <= float(probability) <= 1
-        and not isinstance(following, bool)
-        and isinstance(following, Integral)
-        and 0 <= int(following) < n_states
-        and isinstance(reward, Real)
-        and math.isfinite(reward)
-        and isinstance(terminated, bool | np.bool_ | Integral)
-    )
+    match transition:
+        case [_, bool(), _, _]:  # which would count as an integer
+            return False
+        case [Real() as p, Integral() as state, Real() as r, Integral() | np.bool_()]:
+            return 0 <= float(p) <= 1 and 0 <= int(state) < n_states and math.isfinite(r)
+    return False
 
 
 def _start_distribution(env: gym.Env[Any, Any], given: ArrayLike | None, n_states: int) -> Any:

@@ -23,7 +23,7 @@ from rl_core.kernels.arrays import F64
 from rl_core.kernels.compiled import compiled
 from rl_core.kernels.model import Model
 from rl_core.mdp import MDP
-from rl_core.worlds.discretise import GriddedTask, start_gridded, step_gridded
+from rl_core.worlds.discretise import GriddedTask, cell
 from rl_core.worlds.environments import EnvironmentLike, checked_reward, opened
 
 
@@ -98,15 +98,16 @@ def played(env: EnvironmentLike) -> Played:
     ValueError: env must have a Discrete observation space, got Box([-1.2  -0.07], [0.6  0.07], ...
     """
     made = opened(env)
-    observations, actions = made.observation_space, made.action_space
-    for name, space in (("observation", observations), ("action", actions)):
-        if not isinstance(space, spaces.Discrete):
-            if made is not env:
-                made.close()
-            raise ValueError(f"env must have a Discrete {name} space, got {space}")
-    assert isinstance(observations, spaces.Discrete)
-    assert isinstance(actions, spaces.Discrete)
-    return Played(made, observations, actions)
+    match made.observation_space, made.action_space:
+        case spaces.Discrete() as observations, spaces.Discrete() as actions:
+            return Played(made, observations, actions)
+        case spaces.Discrete(), other:
+            told = f"env must have a Discrete action space, got {other}"
+        case other, _:
+            told = f"env must have a Discrete observation space, got {other}"
+    if made is not env:
+        made.close()
+    raise ValueError(told)
 
 
 def known_model(world: Played) -> MDP | None:
@@ -131,20 +132,12 @@ DiscreteWorld = Model | GriddedTask | Played
 
 def start(world: DiscreteWorld, draws: Draws) -> int:
     """Begin an episode; return its start state."""
-    if isinstance(world, Played):
-        return _start_in_env(world, draws)
-    if isinstance(world, GriddedTask):
-        return start_gridded(world, draws.start)
-    return _start_on_model(world, draws)
+    return _VERBS[type(world)][0](world, draws)
 
 
 def step(world: DiscreteWorld, s: int, a: int, draws: Draws) -> tuple[int, float, bool, bool]:
     """Take action a in the current state s; return s', r, terminated, truncated."""
-    if isinstance(world, Played):
-        return _step_in_env(world, a)
-    if isinstance(world, GriddedTask):
-        return _step_in_grid(world, a)
-    return _step_on_model(world, s, a, draws)
+    return _VERBS[type(world)][1](world, s, a, draws)
 
 
 @compiled
@@ -162,13 +155,6 @@ def _step_on_model(model: Model, s: int, a: int, draws: Draws) -> tuple[int, flo
 
 
 @compiled
-def _step_in_grid(world: GriddedTask, a: int) -> tuple[int, float, bool, bool]:
-    """Take a step; nothing truncates."""
-    s_next, r, terminated = step_gridded(world, a)
-    return s_next, r, terminated, False
-
-
-@compiled
 def _slot(probability: F64, u: float) -> int:
     """Return the first slot whose cumulative probability exceeds u, as Gymnasium does."""
     cumulative = 0.0
@@ -179,17 +165,25 @@ def _slot(probability: F64, u: float) -> int:
     return 0
 
 
-# What the verbs mean in compiled code is decided by the type of the world.
-_starts: dict[type, Callable[..., int]] = {
-    Model: lambda world, draws: _start_on_model(world, draws),
-    GriddedTask: lambda world, draws: start_gridded(world, draws.start),
-}
-_steps: dict[type, Callable[..., tuple[int, float, bool, bool]]] = {
-    Model: lambda world, s, a, draws: _step_on_model(world, s, a, draws),
-    GriddedTask: lambda world, s, a, draws: _step_in_grid(world, a),
-}
-overload(start)(lambda world, draws: _starts[world.instance_class])
-overload(step)(lambda world, s, a, draws: _steps[world.instance_class])
+@compiled
+def _start_in_grid(world: GriddedTask, draws: Draws) -> int:
+    """Draw the start of an episode as the environment's `reset` does; return its cell.
+
+    The acrobot's first observation is here rounded as compiled code rounds a cosine, which may
+    differ from numpy's in the last bit.
+    """
+    world.kernel.start(draws.start, world.kernel.state, world.observation)
+    return cell(world.grid, world.observation)
+
+
+@compiled
+def _step_in_grid(
+    world: GriddedTask, s: int, a: int, draws: Draws
+) -> tuple[int, float, bool, bool]:
+    """Take a step; nothing truncates."""
+    r, terminated = world.kernel.step(world.kernel.state, world.actions[a])
+    world.kernel.observe(world.kernel.state, world.observation)
+    return cell(world.grid, world.observation), r, terminated, False
 
 
 def _start_in_env(world: Played, draws: Draws) -> int:
@@ -202,7 +196,7 @@ def _start_in_env(world: Played, draws: Draws) -> int:
     return _state(world, observation)
 
 
-def _step_in_env(world: Played, a: int) -> tuple[int, float, bool, bool]:
+def _step_in_env(world: Played, s: int, a: int, draws: Draws) -> tuple[int, float, bool, bool]:
     world.steps += 1
     observation, r, terminated, truncated, _ = world.env.step(int(a + world.actions.start))
     s_next, r = _state(world, observation), checked_reward(world, r)
@@ -221,3 +215,23 @@ def _state(world: Played, observation: Any) -> int:
             f"{observation!r}"
         )
     return state
+
+
+# What the verbs mean is decided by the type of the world, in compiled code as well.
+_VERBS: dict[type, tuple[Callable[..., int], Callable[..., tuple[int, float, bool, bool]]]] = {
+    Model: (_start_on_model, _step_on_model),
+    GriddedTask: (_start_in_grid, _step_in_grid),
+    Played: (_start_in_env, _step_in_env),
+}
+
+
+@overload(start, strict=False)
+def _compiled_start(world: Any, draws: Any) -> Any:
+    kernel, _ = _VERBS[world.instance_class]
+    return lambda world, draws: kernel(world, draws)
+
+
+@overload(step, strict=False)
+def _compiled_step(world: Any, s: Any, a: Any, draws: Any) -> Any:
+    _, kernel = _VERBS[world.instance_class]
+    return lambda world, s, a, draws: kernel(world, s, a, draws)
