@@ -121,5 +121,8 @@ bench: setup ## speed ratios against other libraries, measured now on this machi
 	@"$(BIN)/python" -m venv --clear $@
 	@$@/bin/python -m pip install --quiet --requirement bench/jax.txt
 
+timing: setup ## what the book, the preview and the tests take on a clean clone (an hour or two; goes on where it was stopped)
+	$(BIN)/python -m bench.whole
+
 clean: ## remove what was built and measured (keeps .venv)
 	rm -rf _build results

@@ -30,7 +30,7 @@ from rl_core.policies import MLP, Categorical, Gaussian, initial_parameters, mak
 from rl_core.reinforce import ReinforceConfig
 
 SEEDS = range(30)
-BEGINNING = {"episodes": 50, "max_env_steps": 40_000}  # of a seed
+BEGINNING = {"episodes": 50, "max_env_steps": 20_000}  # of a seed
 WHOLE = 2_000  # episodes
 UNIT = "processor µs a step"
 CONFIGS = {
@@ -142,7 +142,7 @@ def learned_share(name: str) -> float:
     return float(table.loc[table["terminated"], "steps"].sum() / table["steps"].sum())
 
 
-def a2c(name: str, seed: int, steps: int = 20_000) -> int:
+def a2c(name: str, seed: int, steps: int = 10_000) -> int:
     """Stable-Baselines3's A2C with 16 environments, network and learning rate the same."""
     model = A2C(
         "MlpPolicy",
@@ -264,7 +264,7 @@ def training_rows() -> Iterator[dict]:
         usual = "usual loop over Gymnasium and torch"
         yield comparison(benchmark, usual, costs["usual"], costs["ours"], UNIT, note)
         if name == "Acrobot-v1":
-            note = f"rival: 16 environments, 20,000 steps; ours: 30 seeds; {beginning}"
+            note = f"rival: 16 environments, 10,000 steps; ours: 30 seeds; {beginning}"
             yield comparison(
                 benchmark, "Stable-Baselines3 A2C", costs["a2c"], costs["ours"], UNIT, note
             )

@@ -101,8 +101,8 @@ captioned(
 )
 
 # %% [markdown]
-# Chapter 1 needs no training; chapters 2 to 6 run on two cores, side by side. [How to reproduce it](a1_reproduce.ipynb) says what
-# was run, with which versions, and what differs from 2018. [Performance](a2_performance.ipynb) says why it is that fast.
+# Chapter 1 needs no training; the runs of chapters 2 to 6 share the cores there are. [How to reproduce it](a1_reproduce.ipynb) says what
+# was run, with which versions, and what differs from 2018. [Performance](a2_performance.ipynb) has the speed beside other libraries, and how the cost grows.
 #
 # ## How to read it
 #

@@ -1,107 +1,103 @@
-"""How the cost of the experiments grows: measured while the page is built, the best of some rounds.
+"""What appendix B reads from its measurements (`bench`): growth, the serial share, what is waited.
 
-Seconds depend on the machine and its neighbours. How they grow does not.
+Seconds depend on the machine and its neighbours. How they grow does so much less.
 """
 
-import time
-from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib import pyplot as plt
-from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
 
-from drawings.look import BLACK, BLUE, GREY, label
-from report.seeds import PREVIEW
-from rl_core.maze import Maze
-from rl_core.planning import value_iteration
-from rl_core.reinforce import ReinforceConfig, reinforce
-from studies.random_mazes import random_maze
-
-ROUNDS = 1 if PREVIEW else 3
-SEED_COUNTS = (1, 2, 4, 8, 16)
-EPISODES = (25, 50, 100, 200, 400)
-SIDES = (12, 40, 125, 395)  # of random mazes with three flags: about 10³ to 10⁶ states
+from rl_core.statistics import bootstrap_interval
 
 
-def _seconds(work: Callable[[], object]) -> float:
-    """The quickest of some rounds: what the work takes when nothing gets in its way."""
-    taken = []
-    for _ in range(ROUNDS):
-        start = time.perf_counter()
-        work()
-        taken.append(time.perf_counter() - start)
-    return min(taken)
+def power(turns: pd.DataFrame) -> float:
+    """The power with which the seconds grow: the slope on logarithmic axes, by least squares.
+
+    Parameters
+    ----------
+    turns : pandas.DataFrame
+        Columns `size` and `seconds`, a row a turn. The slope is that of the medians.
+
+    Examples
+    --------
+    >>> power(pd.DataFrame({"size": [1, 1, 1, 2, 2, 2], "seconds": [1, 1, 9, 4, 4, 4]}))
+    2.0
+    """
+    median = turns.groupby("size")["seconds"].median()
+    sizes = median.index.to_numpy(float)
+    return round(float(np.polyfit(np.log(sizes), np.log(median.to_numpy()), 1)[0]), 6)
 
 
-def _train(seeds: int, episodes: int) -> None:
-    # Every episode stopped at 500 steps: the same work for each seed and episode.
-    config = ReinforceConfig(max_episode_steps=500)
-    reinforce("MountainCar-v0", config, episodes=episodes, seeds=range(1000, 1000 + seeds))
+def each(turns: pd.DataFrame) -> pd.Series:
+    """Median seconds of one (a seed, a state), by size.
+
+    Examples
+    --------
+    >>> each(pd.DataFrame({"size": [1, 10], "seconds": [3.0, 20.0]})).tolist()
+    [3.0, 2.0]
+    """
+    median = turns.groupby("size")["seconds"].median()
+    return median / median.index
 
 
-def by_seeds() -> pd.DataFrame:
-    """Seconds of 50 episodes of REINFORCE against the number of seeds."""
-    _train(1, 1)  # compiles
-    rows = [(seeds, _seconds(lambda seeds=seeds: _train(seeds, 50))) for seeds in SEED_COUNTS]
-    return pd.DataFrame(rows, columns=["seeds", "seconds"])
+@dataclass(frozen=True)
+class Amdahl:
+    """The share of the work that only one core can do, with its interval of 95%.
+
+    G. Amdahl 1967: on n cores what takes T on one takes T (s + (1 - s) / n).
+    """
+
+    share: float
+    low: float
+    high: float
+
+    def speed_up(self, cores: Any, share: float | None = None) -> Any:
+        """How many times as fast so many cores are as one.
+
+        Examples
+        --------
+        >>> float(Amdahl(0.5, 0.5, 0.5).speed_up(2))
+        1.3333333333333333
+        """
+        serial = self.share if share is None else share
+        return 1 / (serial + (1 - serial) / np.asarray(cores))
 
 
-def by_episodes() -> pd.DataFrame:
-    """Seconds of one seed of REINFORCE against the number of episodes."""
-    rows = [(n, _seconds(lambda n=n: _train(1, n))) for n in EPISODES]
-    return pd.DataFrame(rows, columns=["episodes", "seconds"])
+def serial_share(turns: pd.DataFrame) -> Amdahl:
+    """The serial share s = 2 T(2) / T(1) - 1 by the turns' times on one core and on two.
+
+    Below 0 it stands for none at all: the two turns of a pair met other neighbours.
+
+    Examples
+    --------
+    >>> rows = {"size": [1, 2], "turn": [0, 0], "seconds": [10.0, 6.0]}
+    >>> serial_share(pd.DataFrame(rows)).share
+    0.2
+    """
+    by_turn = turns.pivot(index="turn", columns="size", values="seconds")
+    shares = (2 * by_turn[2] / by_turn[1] - 1).clip(0, 1).to_numpy()
+    found = bootstrap_interval(shares, rng=np.random.default_rng(2020))
+    return Amdahl(*(round(float(value), 6) for value in found))
 
 
-def by_states() -> pd.DataFrame:
-    """Seconds of value iteration on random mazes against the number of states."""
-    value_iteration(Maze().model(), gamma=0.99, progress=False)  # compiles
-    rows = []
-    for side in SIDES:
-        rng = np.random.default_rng(side)
-        model = random_maze(side, side, 3, 0.2, rng).model()
-        taken = _seconds(lambda model=model: value_iteration(model, gamma=0.99, progress=False))
-        rows.append((model.n_states, taken))
-    return pd.DataFrame(rows, columns=["states", "seconds"])
+def whole(timing: pd.DataFrame) -> pd.DataFrame:
+    """What the book takes, in minutes, and the share of its cores' time that was waited.
 
-
-def growth(table: pd.DataFrame) -> float:
-    """The power with which the seconds grow: the slope on logarithmic axes, by least squares."""
-    x, y = (np.log(table.iloc[:, column].to_numpy(float)) for column in (0, 1))
-    return float(np.polyfit(x, y, 1)[0])
-
-
-def growth_figure(tables: list[pd.DataFrame]) -> Figure:
-    """Seconds against seeds, episodes and states, each beside proportional growth."""
-    figure, panels = plt.subplots(1, len(tables), figsize=(8.4, 3.2))
-    for axes, table in zip(panels, tables, strict=True):
-        x, y = table.iloc[:, 0], table.iloc[:, 1]
-        axes.plot(x, y.iloc[-1] * x / x.iloc[-1], color=GREY, ls="--", lw=1)
-        axes.plot(x, y, "o-", color=BLUE)
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        if x.max() < 1000:  # else powers of ten do
-            axes.set_xticks(x, x)
-        axes.xaxis.set_minor_formatter(NullFormatter())
-        label(axes, x=f"{table.columns[0]} (log scale)", y="seconds (log scale)")
-    plt.close(figure)
-    return figure
-
-
-def bench_figure(bench: pd.DataFrame) -> Figure:
-    """How many times as long the rival takes, one bar a comparison."""
-    bench = bench[~bench["unit"].str.startswith("bytes")]
-    figure, axes = plt.subplots(figsize=(8.4, 0.46 * len(bench) + 0.9))
-    places = np.arange(len(bench))[::-1]
-    axes.barh(places, bench["ratio"], color=BLUE, height=0.65)
-    for place, ratio in zip(places, bench["ratio"], strict=True):
-        axes.text(ratio * 1.06, place, f"{ratio:g}×", va="center", fontsize=9, color=BLACK)
-    axes.axvline(1, color=BLACK, lw=1)
-    axes.set_yticks(places, bench["benchmark"] + "\nagainst " + bench["against"], fontsize=8)
-    axes.set_xscale("log")
-    axes.set_xlim(0.5, bench["ratio"].max() * 3)
-    axes.grid(axis="y", visible=False)
-    label(axes, x="time of the rival ÷ time of ours (log scale)", y="")
-    plt.close(figure)
-    return figure
+    Examples
+    --------
+    >>> row = {"what": "book", "how": "make book", "cores": 2, "seconds": 60.0}
+    >>> whole(pd.DataFrame([row | {"processor_seconds": 90.0}]))["waiting"].tolist()
+    [0.25]
+    """
+    busy = timing["processor_seconds"] / (timing["cores"] * timing["seconds"])
+    shown = {
+        "what": timing["what"],
+        "how": timing["how"],
+        "cores": timing["cores"],
+        "minutes": timing["seconds"] / 60,
+        "processor minutes": timing["processor_seconds"] / 60,
+        "waiting": 1 - busy,
+    }
+    return pd.DataFrame(shown)
