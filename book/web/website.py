@@ -146,7 +146,7 @@ def set_apart(text: str, page: Path, images: Path) -> str:
 # What must be on a page so that a script has something to do there.
 NEEDED_BY = {
     "/play/": "data-play=",
-    "/sort.js": "aria-sort|<th[^>]*><button",
+    "/sort.js": "sortable",
     "/design-tabs.js": "sd-tab-set",
     "/togglebutton.js": r'class="[^"]*(?<![-\w])(toggle|admonition[^"]* dropdown)(?![-\w])',
     "/copybutton.js": 'class="highlight"',
