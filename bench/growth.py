@@ -15,7 +15,7 @@ import numpy as np
 
 from bench.table import in_turns, processor_seconds
 from rl_core.experiments import Arm, run
-from rl_core.maze import Maze, random_maze
+from rl_core.maze import Maze
 from rl_core.planning import value_iteration
 from rl_core.reinforce import ReinforceConfig, reinforce
 

@@ -29,7 +29,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from myst_nb import glue
-from scipy.stats import fisher_exact
 
 from drawings import dqn as drawings
 from drawings import look
@@ -38,6 +37,7 @@ from report.captions import captioned
 from report.claims import details, record, verdicts, what_it_would_take
 from report.figure_data import offer, tidy
 from report.listings import listing
+from report.paste import paste
 from report.seeds import premise
 from rl_core.dqn import DQNConfig, dqn
 from rl_core.evaluation import rollout
@@ -47,6 +47,7 @@ from rl_core.training import weights_of
 from rl_core.worlds.shaping import Shaping
 from studies import dqn as study
 from studies import dqn_again as again
+from studies import dqn_numbers as numbers
 from studies.curves import learning_curves
 from studies.shared import of_values
 
@@ -211,19 +212,8 @@ captioned(
 )
 
 # %% tags=["remove-cell"]
-for k, count in zip(
-    study.MILESTONES, study.within(curves, "MountainCar, as reported", 105, 175), strict=True
-):
-    glue(f"inside-{k}", count, display=False)
-for k in study.MILESTONES:
-    steps = curves.at("MountainCar, as reported", k)
-    glue(f"car-{k}", f"{np.median(steps):.0f}", display=False)
-    glue(f"car-good-{k}", int((steps <= study.LEARNED).sum()), display=False)
 trained = study.as_trained(results)
-for name in study.ENV:
-    for epsilon, steps in trained[f"{name}, as reported"].items():
-        glue(f"{name} at {epsilon}", f"{np.median(steps):,.0f}".replace("inf", "∞"), display=False)
-        glue(f"{name} lost at {epsilon}", int(np.isinf(steps).sum()), display=False)
+paste(numbers.of_figure_13(curves, trained))
 for sentence, holds in study.premises_of_figure_13(curves).items():
     premise(sentence, holds)
 premise(
@@ -350,24 +340,7 @@ drawings.profiles(of_arm, random)
 # :::
 
 # %% tags=["remove-cell"]
-said = {finding.claim.id: finding.evidence for finding in findings}
-for claim in ("3i", "3j", "3k"):
-    for k, evidence in enumerate(said[claim], 1):
-        glue(f"{claim} {k}", str(evidence), display=False)
-for name in study.ENV:
-    of = near if name == "Acrobot" else curves
-    times = [study.tenths_to_200(of, f"{name}, {one}") for one in ("shaped", "shaped, gamma 0.9")]
-    glue(f"ties {name}", f"{study.ties(*times):.0%}", display=False)
-    for trick in tricks:
-        steps = curves.steps_a_goal(f"{name}, {trick}")
-        glue(f"{name}, {trick} count", int((steps <= study.LEARNED).sum()), display=False)
-        glue(
-            f"{name}, {trick} median", f"{np.median(steps):,.0f}".replace("inf", "∞"), display=False
-        )
-copies = (study.BUDGET["MountainCar"] - study.MEMORY["MountainCar"]) // reported.copy_every
-glue("copies", copies, display=False)
-for gamma in (0.99, 0.9):
-    glue(f"left {gamma}", f"{gamma**copies:.0%}", display=False)
+paste(numbers.of_tricks(curves, near, findings, tricks))
 for sentence, holds in study.premises_of_tricks(curves).items():
     premise(sentence, holds)
 
@@ -450,26 +423,7 @@ drawings.over_the_budget(curves, story)
 # :::
 
 # %% tags=["remove-cell"]
-for name in study.ENV:
-    for variant in variants:
-        share = curves.share(f"{name}, {variant}")[0]
-        glue(f"{name}-{variant}", round(share * len(study.SEEDS)), display=False)
-    greedy = study.greedy_steps(results, f"{name}, original, all four")
-    glue(f"{name}-greedy", f"{np.median(greedy):,.0f}".replace("inf", "∞"), display=False)
-    glue(f"{name}-stuck", int(np.isinf(greedy).sum()), display=False)
-    glue(f"{name}-arrive", int(np.isfinite(greedy).sum()), display=False)
-    for arm in ("original", "original, no replay"):
-        seen, times = study.goals(curves, f"{name}, {arm}")
-        glue(f"{name}, {arm} seen", seen, display=False)
-        glue(f"{name}, {arm} times", times, display=False)
-all_mended = study.mended("MountainCar", study.RIVALS)
-end = all_mended.epsilon.end
-glue("random-share", f"{study.random_share(all_mended, end):.0%}", display=False)
-seen = [
-    study.goals(curves, f"MountainCar, {arm}")[0] for arm in ("original", "original, no replay")
-]
-odds = fisher_exact([seen, [len(study.SEEDS) - count for count in seen]])
-glue("fisher", f"{odds.pvalue:.2g}", display=False)
+paste(numbers.of_replay(curves, results, variants) | numbers.of_chance(fresh))
 for sentence, holds in study.premises_of_replay(curves).items():
     premise(sentence, holds)
 
@@ -477,10 +431,6 @@ premise("500 steps are better than chance.", min(random.values()) > study.LEARNE
 car_arms = [arm.name for arm in study.arms() if arm.name.startswith("MountainCar, ")]
 at_200 = [(curves.steps_a_goal(arm) <= 200).mean() for arm in car_arms if "reported" not in arm]
 premise("At 200 steps hardly a seed is left on MountainCar.", max(at_200) <= 0.1)
-for name in study.ENV:
-    for arm, kept in zip(again.controls(name), again.RUNS, strict=True):
-        middle = np.median(again.steps_a_goal(fresh, arm))
-        glue(f"{name}-random-{kept}", f"{middle:,.0f}".replace("inf", "∞"), display=False)
 
 # %% tags=["hide-input"]
 goal_costs = {

@@ -40,11 +40,11 @@ from report.captions import captioned
 from report.claims import details, record, sensitivity, verdicts, what_it_would_take
 from report.figure_data import offer
 from report.listings import listing
+from report.paste import paste
 from report.seeds import SEEDS, premise
 from rl_core.experiments import Arm, run
 from rl_core.policies import MLP, Gaussian
 from rl_core.reinforce import ReinforceConfig, reinforce
-from rl_core.statistics import proportion_interval
 from rl_core.training import weights_of
 from studies import continuous as study
 from studies import continuous_causes as causes
@@ -270,38 +270,17 @@ drawings.fate_bars(fates)
 # Take the mean away altogether, $\mu = 0$, and let the noise drive.
 
 # %% tags=["hide-input"] mystnb={"image": {"alt": "Share of episodes out of the valley against steps for three widths of the noise. The wider, the sooner."}}
-LONGEST = study.CAP
-alone = {sigma: what_became.noise_alone(sigma, 200, LONGEST) for sigma in study.SIGMAS}
+alone = {sigma: what_became.noise_alone(sigma, 200, study.CAP) for sigma in study.SIGMAS}
 pd.DataFrame(alone).to_csv(RESULTS / "figures" / "figure_s5_2.csv", index=False)
-for sigma, steps in alone.items():
-    out = steps[np.isfinite(steps)]
-    glue(f"out {sigma}", f"{np.isfinite(steps).mean():.0%}", display=False)
-    glue(f"noise {sigma}", f"{np.median(steps):,.0f}".replace("inf", "∞"), display=False)
-    driven = np.minimum(steps, LONGEST).mean()
-    glue(f"cost {sigma}", f"{0.1 * sigma**2 * driven:,.0f}", display=False)
-glue("longest", f"{LONGEST:,}", display=False)
+paste(causes.numbers_of_noise(alone))
+escaped, ever = causes.got_out(alone[0.3], curves)
 tries = study.BUDGET // study.CAP
-chance = 1 - np.isinf(alone[0.3]).mean() ** tries
-ever = curves.rows["as reported"].groupby("seed")["terminated"].any()
-glue("tries", tries, display=False)
-glue("chance", f"{chance:.0%}", display=False)
-glue("ever", int(ever.sum()), display=False)
-escaped = proportion_interval(int(np.isfinite(alone[0.3]).sum()), len(alone[0.3]))
-chances = [f"{1 - (1 - share) ** tries:.0%}" for share in escaped[1:]]
-glue("chances", " to ".join(chances), display=False)
-at_least = proportion_interval(int(ever.sum()), len(SEEDS)).low
-glue("ever-low", f"{at_least:.0%}", display=False)
-glue("tried alone", len(alone[0.3]), display=False)
-premise("more got out than noise explains", at_least > 1 - (1 - escaped.high) ** tries)
-glue("limit", causes.LIMIT, display=False)
-still = 0.1 * 0.3**2 * causes.LIMIT
-glue("still", f"{still:.0f}", display=False)
+paste(causes.numbers_of_chance(escaped, ever, len(SEEDS)))
+premise("more got out than noise explains", ever.low > 1 - (1 - escaped.high) ** tries)
 first_returns = causes.early_returns(curves, "sigma 1")
-glue("clumsy", int((first_returns < -still).sum()), display=False)
-glue("learned-wide", len(first_returns), display=False)
-glue("clumsy-return", f"{np.median(first_returns):,.0f}".replace("-", "−"), display=False)
-premise("nearly all that learned began below rest", np.mean(first_returns < -still) > 0.9)
-drawings.escapes(alone, LONGEST)
+paste(causes.numbers_of_rest(first_returns))
+premise("nearly all that learned began below rest", np.mean(first_returns < -causes.REST) > 0.9)
+drawings.escapes(alone, study.CAP)
 
 # %% [markdown]
 # :::{container} caption

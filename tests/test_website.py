@@ -106,6 +106,11 @@ def test_cells_have_no_address_that_nobody_asks_for():
     assert website.unnamed(text) == text.replace(cells[0], '<td class="x">')
 
 
+def test_words_of_code_are_not_marked_one_by_one(page):
+    code = '<code class="code"><span class="pre">a</span> <span class="pre">b</span></code>'
+    assert website.lightened(HEAD + code, page).endswith('<code class="code">a b</code>')
+
+
 def test_formulas_are_left_for_later(page):
     script = '<script defer="defer" src="../_static/mathjax/tex-chtml.js"></script>'
     text = website.lightened(HEAD.replace("</head>", f"{script}</head>"), page)

@@ -17,11 +17,23 @@ from rl_core.evaluation import Agent, as_learned, evaluate, greedy
 from rl_core.experiments import Arm, Results, run
 from rl_core.policies import MLP, Gaussian
 from rl_core.reinforce import ReinforceConfig, reinforce
-from rl_core.statistics import bootstrap_interval
+from rl_core.statistics import Interval, bootstrap_interval, proportion_interval
 from rl_core.training import weights_of
-from studies.continuous import CAP, ENV, EPISODES, EXTREME, FRESH, SIGMAS, SWEEPS, Curves, config
+from studies.continuous import (
+    BUDGET,
+    CAP,
+    ENV,
+    EPISODES,
+    EXTREME,
+    FRESH,
+    SIGMAS,
+    SWEEPS,
+    Curves,
+    config,
+)
 
 LIMIT = 999  # steps: Gymnasium's own time limit
+REST = 0.1 * 0.3**2 * LIMIT  # what trembling about zero with sigma 0.3 costs until then
 SOLVED = 90  # return, by Gymnasium
 TRIES = 100  # episodes of an agent that is evaluated
 FORCES = (0.2, 0.4, 0.6, 0.8, 1.0, 1.5)
@@ -189,3 +201,47 @@ def parting(tables: dict[str, pd.DataFrame]) -> int:
     both = min(len(one), len(other))
     parted = np.flatnonzero(one[:both] != other[:both])
     return int(parted[0]) + 1 if len(parted) else 0
+
+
+def numbers_of_noise(alone: dict[float, np.ndarray]) -> dict[str, str | int]:
+    """How far noise of each width gets alone, and what it has cost by then."""
+    numbers: dict[str, str | int] = {"longest": f"{CAP:,}", "tried alone": len(alone[0.3])}
+    for sigma, steps in alone.items():
+        median, driven = np.median(steps), np.minimum(steps, CAP).mean()
+        numbers[f"out {sigma}"] = f"{np.isfinite(steps).mean():.0%}"
+        numbers[f"noise {sigma}"] = f"{median:,.0f}".replace("inf", "∞")
+        numbers[f"cost {sigma}"] = f"{0.1 * sigma**2 * driven:,.0f}"
+    return numbers
+
+
+def got_out(alone: np.ndarray, curves: Curves) -> tuple[Interval, Interval]:
+    """Shares with 95% intervals: episodes of noise alone, and seeds as reported, that got out."""
+    ever = curves.rows["as reported"].groupby("seed")["terminated"].any()
+    return (
+        proportion_interval(int(np.isfinite(alone).sum()), len(alone)),
+        proportion_interval(int(ever.sum()), len(curves.seeds)),
+    )
+
+
+def numbers_of_chance(escaped: Interval, ever: Interval, seeds: int) -> dict[str, str | int]:
+    """How many seeds noise alone would get out within the budget, and how many did get out."""
+    tries = BUDGET // CAP
+    chance, *chances = (f"{1 - (1 - share) ** tries:.0%}" for share in escaped)
+    return {
+        "tries": tries,
+        "chance": chance,
+        "chances": " to ".join(chances),
+        "ever": round(ever.estimate * seeds),
+        "ever-low": f"{ever.low:.0%}",
+    }
+
+
+def numbers_of_rest(first_returns: np.ndarray) -> dict[str, str | int]:
+    """How the first episodes of those that learned compare with resting."""
+    return {
+        "limit": LIMIT,
+        "still": f"{REST:.0f}",
+        "clumsy": int((first_returns < -REST).sum()),
+        "learned-wide": len(first_returns),
+        "clumsy-return": f"{np.median(first_returns):,.0f}".replace("-", "−"),
+    }

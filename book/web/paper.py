@@ -208,7 +208,7 @@ def print_page(browser: Browser, page: Path) -> bytes:
         window.evaluate(STILLS)
         return window.pdf(
             format="A4",
-            margin=dict.fromkeys(("top", "bottom", "left", "right"), "16mm"),
+            margin=dict.fromkeys(("top", "bottom", "left", "right"), "14mm"),
             display_header_footer=True,
             header_template="<span></span>",
             footer_template=NUMBER,

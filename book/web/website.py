@@ -146,7 +146,7 @@ def set_apart(text: str, page: Path, images: Path) -> str:
 # What must be on a page so that a script has something to do there.
 NEEDED_BY = {
     "/play/": "data-play=",
-    "/sort.js": "aria-sort|<th[^>]*><button",
+    "/sort.js": "sortable",
     "/design-tabs.js": "sd-tab-set",
     "/togglebutton.js": r'class="[^"]*(?<![-\w])(toggle|admonition[^"]* dropdown)(?![-\w])',
     "/copybutton.js": 'class="highlight"',
@@ -213,7 +213,9 @@ def lightened(text: str, page: Path) -> str:
     scripts = r"<script((?![^>]*(?:/late\.js|documentation_options))[^>]*\ssrc=[^>]*)></script>"
     text = re.sub(scripts, lambda script: later(script, text), text)
     text = re.sub(r'<script (src="[^"]*/late\.js)', r"<script defer \1", text)
-    head, body = unnamed(text).split("</head>", 1)
+    # A mark around each word of code: a twelfth of all that the reference consists of.
+    text = re.sub(r'<span class="pre">([^<]*)</span>', r"\1", unnamed(text))
+    head, body = text.split("</head>", 1)
     body = re.sub(r"<img((?:\s[^>]*)?>)", lambda tag: sized(tag, page), body)
     body = re.sub(r"<img (?![^>]*\bloading=)", '<img loading="lazy" ', body)
     body = re.sub(r"<th(?:\s[^>]*)?>(?:\s|&nbsp;)*</th>", "<td></td>", body)
