@@ -11,8 +11,7 @@ import resource
 import tempfile
 from collections.abc import Callable, Iterator
 
-import numpy as np
-
+from bench.planning import maze_model
 from bench.table import in_turns, processor_seconds
 from rl_core.experiments import Arm, run
 from rl_core.maze import Maze
@@ -26,7 +25,7 @@ SIDES = (12, 40, 125, 395, 1250)  # of mazes: about 10³ to 10⁷ states
 CORES = (1, 2)
 EXPERIMENT = {"seeds": range(30), "episodes": 1_000}
 CONFIG = ReinforceConfig(max_episode_steps=500)
-WALLS, FLAGS, GAMMA = 0.2, 3, 0.99
+FLAGS, GAMMA = 3, 0.99
 
 
 def train(seeds: int, episodes: int) -> None:
@@ -51,8 +50,7 @@ def _of_children() -> float:
 
 def plan(side: int) -> tuple[int, Callable[[], object]]:
     """Return the number of states of a maze, and what plans it."""
-    rng = np.random.default_rng(side)
-    model = random_maze(side, side, FLAGS, WALLS, rng).model()
+    model = maze_model(side, FLAGS)
     return model.n_states, lambda: value_iteration(model, gamma=GAMMA, progress=False)
 
 

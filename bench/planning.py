@@ -163,8 +163,8 @@ def times(side: int, flags: int, library: str, method: str, at_least: int) -> Ti
     """Let a rival and ours take turns: so many at least, and more if that is quick."""
     from rl_core.planning import value_iteration
 
-    model = _maze(side, flags)
-    small = _maze(10, flags)
+    model = maze_model(side, flags)
+    small = maze_model(10, flags)
     value_iteration(small, gamma=GAMMA)
     V_star = value_iteration(model, gamma=GAMMA, tolerance=1e-9, progress=False).V
     make = {"QuantEcon": _quantecon, "mdpsolver": _mdpsolver, "Storm": _Storm}[library]
@@ -301,9 +301,9 @@ def memory(side: int, flags: int) -> dict[str, float]:
     """Peak resident memory of model and planning above what the process had before, in bytes."""
     from rl_core.planning import value_iteration
 
-    value_iteration(_maze(10, flags), gamma=GAMMA)
+    value_iteration(maze_model(10, flags), gamma=GAMMA)
     before = _status("VmRSS")
-    model = _maze(side, flags)
+    model = maze_model(side, flags)
     model = replace(model, reward=model.reward + 0.0)  # zeros never written take no memory
     process = _status("VmHWM")
     Path("/proc/self/clear_refs").write_text("5")  # the peak counts from here
@@ -338,7 +338,7 @@ def compile_once(side: int, flags: int) -> dict[str, float]:
     """Seconds the first call takes beyond the second."""
     from rl_core.planning import value_iteration
 
-    model = _maze(side, flags)
+    model = maze_model(side, flags)
     seconds = []
     for _ in range(2):
         before = time.perf_counter()
@@ -347,7 +347,8 @@ def compile_once(side: int, flags: int) -> dict[str, float]:
     return {"seconds": seconds[0] - seconds[1]}
 
 
-def _maze(side: int, flags: int) -> Any:
+def maze_model(side: int, flags: int) -> Any:
+    """Return the model of a random maze, which the book's own modules draw."""
     sys.path.append(str(ROOT / "book"))
     from studies.random_mazes import random_maze
 
