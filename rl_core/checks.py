@@ -231,8 +231,8 @@ def floats(
     Traceback (most recent call last):
     ValueError: V must be finite, at (1,) it is nan
     """
-    lengths = ", ".join("any" if n is None else str(n) for n in shape)
-    wanted = f"an array of numbers of shape ({lengths})"
+    axes = ", ".join("any" if n is None else str(n) for n in shape)
+    wanted = f"an array of numbers of shape ({axes})"
     try:
         given = np.asarray(values)
     except (RuntimeError, TypeError, ValueError):  # ragged nesting, or what its own code raises
