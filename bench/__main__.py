@@ -54,8 +54,7 @@ def keep(rows: list[dict], path: Path) -> pd.DataFrame:
 def main(modules: list[str]) -> None:
     """Measure; print the comparisons as Markdown; keep all as `results/bench.csv`, `growth.csv`.
 
-    What the book shows is `book/data/bench.csv` and `book/data/growth.csv`: copy a measurement of
-    all modules there, and what is printed into the README.
+    `python -m bench.adopt` makes them what the book and the README show.
     """
     allowed = (*MODULES, GROWTH)
     unknown = sorted(set(modules) - set(allowed))

@@ -3,8 +3,8 @@
 Each step is a command of the Makefile, timed by the wall clock and by processor time. A step that
 is done is kept in `results/timing/timing.csv`; after an interruption the same call goes on with the
 next one. What the steps say goes to `results/timing/<step>.log`. It takes an hour or two; when all
-is done the clone is removed and the table is `results/timing.csv`, to be copied to
-`book/data/timing.csv`.
+is done the clone is removed and the table is `results/timing.csv`. `python -m bench.adopt` makes it
+what the book shows and `make book` announces.
 """
 
 import csv
@@ -148,7 +148,7 @@ def main(steps: tuple[Step, ...] = STEPS) -> int:
     if not failed:
         shutil.copy(table, FOLDER.parent / "timing.csv")
         shutil.rmtree(FOLDER)
-        print(f"The table is {FOLDER.parent / 'timing.csv'}: copy it to book/data/timing.csv")
+        print(f"The table is {FOLDER.parent / 'timing.csv'}; next: python -m bench.adopt")
     return failed
 
 

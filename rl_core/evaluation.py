@@ -24,6 +24,7 @@ import numpy as np
 import pandas as pd
 import torch
 from gymnasium import spaces
+from gymnasium.wrappers import TransformObservation
 from numpy.typing import NDArray
 
 from rl_core import modules
@@ -635,9 +636,7 @@ def _opened(env: EnvironmentLike, agent: Agent) -> World:
     world: World
     if isinstance(agent.actor, TableActor) and isinstance(spaces_of(env)[0], spaces.Discrete):
         made, seen = environments.opened(env), spaces.Box(-np.inf, np.inf, (1,))
-        numbers = gymnasium.wrappers.TransformObservation(
-            made, lambda state: np.array([state], np.float32), seen
-        )
+        numbers = TransformObservation(made, lambda state: np.array([state], np.float32), seen)
         world = GymnasiumWorld(numbers, owned=made is not env)
     else:
         world = environments.open_world(env)

@@ -454,8 +454,7 @@ def optimal_actions(Q: ArrayLike, tolerance: float = 1e-9) -> Bools:
     tolerance = checks.number("tolerance", tolerance, 0)
     margin = np.maximum(tolerance, TIE * np.abs(table).max(axis=1, keepdims=True))
     with np.errstate(over="ignore"):
-        best: Bools = table >= table.max(axis=1, keepdims=True) - margin
-    return best
+        return np.asarray(table >= table.max(axis=1, keepdims=True) - margin)
 
 
 class _Record:

@@ -194,8 +194,8 @@ def q_learning(
     seeds = checks.distinct_seeds(one_seed_of(env, seeds))
     episodes = checks.integer("episodes", episodes, 1)
     at = checks.integers("snapshots", snapshots, 0, episodes)
-    if progress is not None:
-        checks.instance("progress", progress, Callable, "a function of episodes and steps, or None")
+    told = checks.instance, Callable, "a function of episodes and steps"
+    checks.optional("progress", progress, *told)
     with _opened(env, config) as (world, model, shape):
         _check_memory(config, shape, len(seeds) * (1 + len(at)))
         yardstick = make_yardstick(model, Q_star, shape)

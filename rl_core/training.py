@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from rl_core.checks import distinct_seeds, instance, integer, integers, require
+from rl_core.checks import distinct_seeds, instance, integer, integers, optional, require
 from rl_core.kernels.arrays import Arrays
 
 PROGRESS_EVERY = 10
@@ -165,7 +165,7 @@ class Training:
         self.failure: Failure | None = None
         self.kept: dict[str, Arrays] = {}
         self._snapshots, self._report = set(snapshots), report
-        self._rows: list[tuple[int, float, bool]] = []
+        self._rows: list[tuple[int, int, int, float, bool, int]] = []
         self._budget = sys.maxsize
 
     def course(self, max_env_steps: int | None, learned: Callable[[], Arrays]) -> Iterator[int]:
@@ -202,8 +202,9 @@ class Training:
 
     def add(self, steps: int, total: float, terminated: bool) -> None:
         """Add the row of an episode; a return that is not finite ends the seed."""
-        self._rows.append((steps, total, terminated))
         self.env_steps += steps
+        episode = len(self._rows) + 1
+        self._rows.append((self.seed, episode, steps, total, terminated, self.env_steps))
         if not math.isfinite(total):
             self.fail(f"the return is {total}")
 
@@ -213,11 +214,8 @@ class Training:
 
     def table(self) -> pd.DataFrame:
         """Return one row an episode."""
-        table = pd.DataFrame(self._rows, columns=["steps", "return", "terminated"])
-        table.insert(0, "seed", self.seed)
-        table.insert(1, "episode", np.arange(1, len(table) + 1))
-        table["env_steps"] = table["steps"].cumsum()
-        return table
+        columns = ["seed", "episode", "steps", "return", "terminated", "env_steps"]
+        return pd.DataFrame(self._rows, columns=columns)
 
     def arrays(self) -> Arrays:
         """Return what was kept, by moment and name; a moment never reached is the last one."""
@@ -276,8 +274,7 @@ def train_seeds(
     instance("train", train, Callable, "a function of a Training")
     seeds, episodes = distinct_seeds(seeds), integer("episodes", episodes, 1)
     snapshots = integers("snapshots", snapshots, 0, episodes)
-    if progress is not None:
-        instance("progress", progress, Callable, "a function of episodes and steps, or None")
+    optional("progress", progress, instance, Callable, "a function of episodes and steps")
     done: list[Training] = []
 
     def report(now: int, steps: int) -> None:

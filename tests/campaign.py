@@ -191,7 +191,8 @@ CALLS: dict[str, Callable[[], dict[str, Any]]] = {
     "exploration.VisitDecay": lambda: {"initial": 1.0, "exponent": 0.6},
     "exploration.check_epsilon": lambda: {"name": "value", "value": 0.1},
     "exploration.check_step_size": lambda: {"name": "value", "value": 0.1},
-    "exploration.parameter_of": lambda: {"name": "value", "value": 0.1, "check": number},
+    "exploration.parameter_of": lambda: {"name": "value", "value": 0.1, "check": number,
+                                         "unit": "episodes"},
     "exploration.schedule_state": lambda: {"epsilon": 0.1},
     "exploration.values": lambda: {"parameter": 0.1, "episodes": 3},
     "identity.describe": lambda: {"value": LINEAR, "name": "value", "modules": None},
@@ -322,7 +323,7 @@ INSIDE = {
     "worlds.twins.twin": "of a text",
 }
 
-HOW = {"name", "allowed", "check", "modules"}
+HOW = {"name", "allowed", "check", "modules", "unit"}
 """Arguments that say how to check and how to tell of it: they stand in code."""
 
 WORK = {"episodes": 10**4, "resamples": 10**4, "max_steps": 10**4, "max_episode_steps": 10**4,

@@ -5,6 +5,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from bench.adopt import adopt
 from bench.table import COLUMNS, TURNS, comparison, in_turns, markdown
 
 ROOT = Path(__file__).parent.parent
@@ -90,3 +91,13 @@ def test_the_speeds_aimed_at_are_among_it(words, at_least):
 
 def test_the_readme_shows_it():
     assert markdown(MEASURED) in (ROOT / "README.md").read_text()
+
+
+def test_what_was_measured_is_adopted(tmp_path):
+    for folder in ("results", "book/data"):
+        (tmp_path / folder).mkdir(parents=True)
+    (tmp_path / "README.md").write_text("# a\n\nMeasured on x.\n\n| b |\n\n## c\n\nd\n")
+    MEASURED.to_csv(tmp_path / "results/bench.csv", index=False)
+    assert adopt(tmp_path) == ["bench.csv"]
+    pd.testing.assert_frame_equal(pd.read_csv(tmp_path / "book/data/bench.csv"), MEASURED)
+    assert (tmp_path / "README.md").read_text() == f"# a\n\n{markdown(MEASURED)}\n\n## c\n\nd\n"

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 import rl_core.experiments.store as store_module
-from rl_core.experiments.store import ARRAYS, RECORD, TABLE, DamagedResultError, Store, scratch
-from rl_core.training import Failure
+from rl_core.experiments.store import ARRAYS, RECORD, TABLE, DamagedResultError, Store
+from rl_core.training import Failure, Run
 
 DIGEST = "0f" * 32
 FILES = [TABLE, ARRAYS, RECORD]
@@ -41,10 +41,8 @@ def write_example(store, digest=DIGEST, **changes):
             "count": np.int64(7) * np.ones((), int),
         },
         "failures": [Failure(5, 3, "the weights are “NaN”")],
-        "provenance": {"seed": 5, "config": {"gamma": 0.99}},
     }
-    content.update(changes)
-    store.write(digest, **content)
+    store.write(digest, Run(**content | changes), {"seed": 5, "config": {"gamma": 0.99}})
 
 
 @pytest.fixture
@@ -58,11 +56,11 @@ def bits(array):
 
 def test_a_result_comes_back_as_it_was(store):
     write_example(store)
-    stored = store.read(DIGEST)
+    stored, provenance = store.read(DIGEST)
     pd.testing.assert_frame_equal(stored.table, example_table(), check_exact=True)
     assert np.signbit(stored.table.steps[2])
     assert stored.failures == (Failure(5, 3, "the weights are “NaN”"),)
-    assert stored.provenance == {"seed": 5, "config": {"gamma": 0.99}}
+    assert provenance == {"seed": 5, "config": {"gamma": 0.99}}
     arrays = store.read_arrays(DIGEST)
     assert sorted(arrays) == ["count", "weights"]
     np.testing.assert_array_equal(arrays["weights"], [[0, 1, 2], [3, 4, 5]])
@@ -71,9 +69,9 @@ def test_a_result_comes_back_as_it_was(store):
 
 
 def test_what_is_not_there(store):
-    assert store.read(DIGEST) is None
-    with pytest.raises(KeyError, match=DIGEST):
-        store.read_arrays(DIGEST)
+    for read in (store.read, store.read_arrays):
+        with pytest.raises(KeyError, match=DIGEST):
+            read(DIGEST)
 
 
 DTYPES = ["?", "i1", "u2", "i4", "i8", "u8", "f2", "f4", "f8"]
@@ -106,7 +104,7 @@ def test_different_nans_and_zeros_stay_different(store):
 
 def test_results_without_rows_or_arrays(store):
     write_example(store, table=example_table().iloc[:0], arrays={}, failures=[])
-    stored = store.read(DIGEST)
+    stored, _ = store.read(DIGEST)
     pd.testing.assert_frame_equal(stored.table, example_table().iloc[:0])
     assert store.read_arrays(DIGEST) == {}
     assert stored.failures == ()
@@ -118,7 +116,8 @@ def test_results_without_rows_or_arrays(store):
 def test_arrays_of_other_types_are_refused(store, array):
     with pytest.raises(TypeError, match=r"array 'a' has dtype .*; allowed are"):
         write_example(store, arrays={"a": array})
-    assert store.read(DIGEST) is None
+    with pytest.raises(KeyError):
+        store.read(DIGEST)
 
 
 def test_files_are_in_formats_that_others_can_read(store):
@@ -151,7 +150,7 @@ def test_any_flipped_bit_is_found(store, file):
         path.write_bytes(damaged)
         assert_damage_is_named(store, file)
     path.write_bytes(intact)
-    assert store.read(DIGEST) is not None
+    store.read(DIGEST)
 
 
 @pytest.mark.parametrize("file", FILES)
@@ -184,7 +183,7 @@ def test_a_damaged_result_is_replaced_and_an_intact_one_kept(store, file):
     assert folder.stat().st_ino == written
     (folder / file).write_bytes(b"")
     write_example(store)
-    assert store.read(DIGEST) is not None
+    store.read(DIGEST)
     assert folder.stat().st_ino != written
     assert list((store.path / "scratch").iterdir()) == []
 
@@ -195,7 +194,7 @@ def test_a_file_where_the_folder_should_be_is_replaced(store):
     with pytest.raises(DamagedResultError):
         store.read(DIGEST)
     write_example(store)
-    assert store.read(DIGEST) is not None
+    store.read(DIGEST)
 
 
 # --- interrupted writing --------------------------------------------------------------------------
@@ -221,9 +220,10 @@ def test_an_interrupted_write_leaves_nothing_to_read(store, monkeypatch, calls):
         patch.setattr(os, "rename", stop_after(os.rename))
         with pytest.raises(KeyboardInterrupt):
             write_example(store)
-    assert store.read(DIGEST) is None
+    with pytest.raises(KeyError):
+        store.read(DIGEST)
     write_example(store)
-    assert store.read(DIGEST) is not None
+    store.read(DIGEST)
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/fd"), reason="tells files by Linux's /proc")
@@ -251,7 +251,7 @@ def test_leftovers_of_the_dead_are_cleaned_and_the_living_are_left_alone(store):
     dead = store.path / "scratch" / "dead"
     dead.mkdir(parents=True)
     (dead / "table.parquet").write_text("half")
-    with scratch(store.path / "scratch") as living:
+    with store.scratch() as living:
         store.clean()
         assert not dead.exists()
         assert living.exists()

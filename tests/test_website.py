@@ -3,7 +3,9 @@
 import base64
 import re
 import struct
+from pathlib import Path
 
+import pydata_sphinx_theme
 import pytest
 import styles
 import website
@@ -104,6 +106,12 @@ def test_cells_have_no_address_that_nobody_asks_for():
     cells = ['<td id="T_table-1-1_row0_col0" class="x">', '<td id="T_table-1-1_row1_col0">']
     text = f"<style>#T_table-1-1_row1_col0 {{ }}</style><table id='T_table-1-1'>{''.join(cells)}"
     assert website.unnamed(text) == text.replace(cells[0], '<td class="x">')
+
+
+def test_the_theme_measures_one_piece_of_code_at_a_time():
+    folder = Path(pydata_sphinx_theme.__file__).parent / "theme/pydata_sphinx_theme/static/scripts"
+    script = (folder / "pydata-sphinx-theme.js").read_text(encoding="utf-8")
+    assert "setTimeout((()=>{e.tabIndex=" in website.unhurried(script)
 
 
 def test_words_of_code_are_not_marked_one_by_one(page):

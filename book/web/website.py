@@ -226,6 +226,15 @@ def lightened(text: str, page: Path) -> str:
     return head + "</head>" + body
 
 
+def unhurried(script: str) -> str:
+    """Let the theme measure one piece of code after the other, not 200 in one go.
+
+    It asks of each whether it scrolls, so that the keyboard can reach it, and waits for a layout.
+    """
+    measure = "e.tabIndex=e.scrollWidth>e.clientWidth||e.scrollHeight>e.clientHeight?0:-1"
+    return script.replace(measure, f"setTimeout((()=>{{{measure}}}))")
+
+
 def lighten(app: Sphinx, error: Exception | None) -> None:
     """Rewrite all pages, write the icons that they use, and leave the styles that they use."""
     if error is not None or app.builder.name != "html":
@@ -237,6 +246,8 @@ def lighten(app: Sphinx, error: Exception | None) -> None:
         if "</head>" in text:
             light = set_apart(lightened(text, page), page, site / "_images")
             page.write_text(light, encoding="utf-8")
+    theme = site / "_static/scripts/pydata-sphinx-theme.js"
+    theme.write_text(unhurried(theme.read_text(encoding="utf-8")), encoding="utf-8")
     (site / "_static/icons.css").write_text(icons.style(site), encoding="utf-8")
     shutil.rmtree(site / "_static/vendor/fontawesome")
     styles.prune(site)

@@ -11,9 +11,9 @@ from rl_core.experiments import provenance
 from rl_core.identity import describe, import_path
 from rl_core.training import Run
 from rl_core.worlds import names
-from rl_core.worlds.names import EnvironmentName, Make
+from rl_core.worlds.names import Make
 
-FORMAT = 3  # of what the store keeps; part of every digest
+FORMAT = 4  # of what the store keeps; part of every digest
 TAKEN = {"arm", "seed", "episode", "steps", "return", "terminated", "env_steps"}  # columns
 
 Label = str | int | float | bool
@@ -73,16 +73,14 @@ class Arm:
         fields(
             self,
             name=(instance, str, "a text that is not empty"),
-            algorithm=(_importable, "a function"),
-            env=(_name,),
             episodes=(integer, 1),
             snapshots=(instance, tuple, "a tuple of integers"),
             labels=(instance, Mapping, "a mapping of names to values"),
         )
+        import_path("algorithm", self.algorithm, "a function")
+        object.__setattr__(self, "env", names.name_of(self.env))
         require(self.name, "name", self.name, "a text that is not empty")
-        object.__setattr__(
-            self, "snapshots", integers("snapshots", self.snapshots, 0, self.episodes)
-        )
+        fields(self, snapshots=(integers, 0, self.episodes))
         parameters = getattr(type(self.config), "__dataclass_params__", None)
         if parameters is None or not parameters.frozen:
             raise TypeError(f"config must be a frozen dataclass's instance, got {self.config!r}")
@@ -156,12 +154,3 @@ class Arm:
             "platform": provenance.platform_settings(),
             "versions": provenance.versions(),
         }
-
-
-def _name(_: str, value: object) -> EnvironmentName:
-    return names.name_of(value)
-
-
-def _importable(name: str, value: object, allowed: str) -> object:
-    import_path(name, value, allowed)
-    return value

@@ -8,8 +8,7 @@ import importlib
 import sys
 from collections import Counter
 from collections.abc import Mapping
-from types import TracebackType
-from typing import Self
+from contextlib import AbstractContextManager
 
 from tqdm import tqdm
 
@@ -18,7 +17,7 @@ LOG_SECONDS = 30.0
 FORMAT = "{desc}{percentage:3.0f}% of {total_fmt} seeds{postfix}, {remaining} left"
 
 
-class Progress:
+class Progress(AbstractContextManager["Progress"]):
     """Counts finished seeds and shows them.
 
     Parameters
@@ -64,15 +63,7 @@ class Progress:
         self._bar.set_postfix_str(f"{self._env_steps / seconds:,.0f} steps/s", refresh=False)
         self._bar.update()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._bar.close()
         if isinstance(self._screen, _Cell):
             self._screen.show("")  # a saved notebook does not depend on how long it took

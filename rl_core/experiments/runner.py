@@ -13,14 +13,15 @@ seed is stored as soon as it is done: what is killed loses no more than the seed
 """
 
 import dataclasses
+import os
 import tempfile
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from os import getpid
 from pathlib import Path
+from typing import Any
 
 import joblib
 import numpy as np
@@ -31,14 +32,17 @@ from joblib.parallel import BACKENDS, EXTERNAL_BACKENDS
 from rl_core.checks import distinct_seeds, instance, integer, one_of, optional, require, truth
 from rl_core.experiments.arms import Arm
 from rl_core.experiments.progress import Progress
-from rl_core.experiments.store import DamagedResultError, Store, Stored, scratch, sweep
-from rl_core.experiments.workers import Outcome, Task, run_task, use_threads
+from rl_core.experiments.store import DamagedResultError, Store
+from rl_core.experiments.workers import Task, run_task, use_threads
 from rl_core.identity import canonical_json, digest
 from rl_core.kernels.arrays import Arrays
 from rl_core.training import Failure, Run
 from rl_core.worlds.names import check_elsewhere
 
-TEMPORARY = "rl_core-"  # what joblib's temporary folders are called
+# Named to joblib, whose tracker takes short names in ASCII, though nothing is written to it.
+TEMPORARY = "/tmp" if os.path.isdir("/tmp") else tempfile.gettempdir()
+
+Stored = tuple[Run, dict[str, Any]]  # a run without its arrays, and its provenance
 
 
 class DamagedResultWarning(UserWarning):
@@ -92,18 +96,13 @@ class Results:
         ValueError
             There is no such arm, or an array's shape differs from seed to seed.
         """
-        one_of("arm", arm, list(dict.fromkeys(self.provenance.arm)))
+        one_of("arm", arm, list(self._arms))
         digests = self.provenance.digest[self.provenance.arm == arm]
         seeds = [self._store.read_arrays(name) for name in digests]
-        stacked = {}
-        for name in seeds[0]:
-            shapes = {arrays[name].shape for arrays in seeds}
-            if len(shapes) > 1:
-                raise ValueError(
-                    f"array {name!r} of arm {arm!r} must have one shape, got {sorted(shapes)}"
-                )
-            stacked[name] = np.stack([arrays[name] for arrays in seeds])
-        return stacked
+        try:
+            return {name: np.concatenate([arrays[name] for arrays in seeds]) for name in seeds[0]}
+        except ValueError as error:
+            raise ValueError(f"arrays of arm {arm!r} must have one shape each: {error}") from error
 
 
 def run(
@@ -178,22 +177,42 @@ def run(
     instance("store", store, Store | Path | str, "a folder's path or a Store")
     identities = [arm.check() for arm in arms]
     store = Store(Path(store.path if isinstance(store, Store) else store).resolve())
-    with _told(store):
-        store.clean()
     tasks = [
         Task(arm, seed, identity, digest({**identity, "seed": seed}))
         for arm, identity in zip(arms, identities, strict=True)
         for seed in seeds
     ]
-    stored = {task: _read(store, task) for task in tasks}
-    missing = [task for task in tasks if stored[task] is None]
+    stored = _stored(tasks, store)
+    missing = [task for task in tasks if task not in stored]
     if missing:
         if workers > 1 and backend != "threading":
             _check_workers(missing)
         _work(missing, store, workers, backend, progress)
-    for task in missing:
-        stored[task] = store.read(task.digest)
-    return _results({task: _present(task, result) for task, result in stored.items()}, store)
+        stored |= {task: store.read(task.digest) for task in missing}
+    return _results({task: stored[task] for task in tasks}, store)
+
+
+def _stored(tasks: Sequence[Task], store: Store) -> dict[Task, Stored]:
+    """Return what the store has of `tasks`; make sure that it can take the rest."""
+    found: dict[Task, Stored] = {}
+    try:
+        store.clean()
+        for task in tasks:
+            try:
+                found[task] = store.read(task.digest)
+            except KeyError:
+                continue
+            except DamagedResultError as error:
+                told = f"arm {task.arm.name!r}, seed {task.seed}: {error}; it is made again"
+                warnings.warn(told, DamagedResultWarning, stacklevel=3)
+        if len(found) < len(tasks):
+            with store.scratch():
+                pass
+    except OSError as error:
+        raise ValueError(
+            f"store must be a folder that can be written, got {str(store.path)!r}: {error.strerror}"
+        ) from error
+    return found
 
 
 def _check_workers(tasks: Sequence[Task]) -> None:
@@ -207,64 +226,30 @@ def _check_workers(tasks: Sequence[Task]) -> None:
 
 def _checked_arms(arms: object) -> list[Arm]:
     allowed = "a sequence of Arm, at least one and each name once"
-    found = list(instance("arms", arms, Iterable, allowed))
-    for arm in found:
-        instance("arms", arm, Arm, allowed)
+    given = instance("arms", arms, Iterable, allowed)
+    found = [instance("arms", arm, Arm, allowed) for arm in given]
     names = [arm.name for arm in found]
     require(names and len(set(names)) == len(names), "arms", names, allowed)
     return found
 
 
-def _read(store: Store, task: Task) -> Stored | None:
-    """Return the task's result, or None if it has to be made; warn if it was damaged."""
-    try:
-        return store.read(task.digest)
-    except DamagedResultError as error:
-        warnings.warn(
-            f"arm {task.arm.name!r}, seed {task.seed}: {error}; it is made again",
-            DamagedResultWarning,
-            stacklevel=4,
-        )
-        return None
-
-
-def _present(task: Task, result: Stored | None) -> Stored:
-    if result is None:
-        raise RuntimeError(
-            f"the result of arm {task.arm.name!r}, seed {task.seed} was stored and is gone"
-        )
-    return result
-
-
 def _work(tasks: Sequence[Task], store: Store, workers: int, backend: str, progress: bool) -> None:
     """Run and store `tasks` over the workers; raise at the end if some could not be done."""
-    with _told(store), scratch(store.path / "scratch"):
-        pass
     first = {task.digest: task for task in reversed(tasks)}  # arms may differ in name only
     work = [task for task in tasks if first[task.digest] is task]
-    failed: list[Outcome] = []
+    failed = []
     with (
         Progress(Counter(task.arm.name for task in work), progress) as shown,
         _joblib(backend, workers) as parallel,
     ):
-        parent = getpid()
+        parent = os.getpid()
         for done in parallel(joblib.delayed(run_task)(task, store, parent) for task in work):
             shown.done(done.arm, done.env_steps)
-            failed += [done] if done.message else []
+            if done.error is not None:
+                failed.append(done.error)
     if failed:
         message = f"{len(failed)} of {len(work)} seeds failed; the others are stored"
-        raise ExceptionGroup(message, [outcome.exception() for outcome in failed])
-
-
-@contextmanager
-def _told(store: Store) -> Iterator[None]:
-    """Say which argument is meant if the block cannot use the store."""
-    try:
-        yield
-    except OSError as error:
-        raise ValueError(
-            f"store must be a folder that can be written, got {str(store.path)!r}: {error.strerror}"
-        ) from error
+        raise ExceptionGroup(message, failed)
 
 
 @contextmanager
@@ -272,14 +257,9 @@ def _joblib(backend: str, workers: int) -> Iterator[joblib.Parallel]:
     """Give joblib's `Parallel` with `workers` of this kind, with one thread each."""
     limit = {"inner_max_num_threads": 1} if backend == "loky" else {}
     threads = use_threads(1)
-    home = _temporary()
-    sweep(home, f"{TEMPORARY}*")
     try:
-        with (
-            scratch(home, TEMPORARY) as folder,
-            joblib.parallel_config(
-                backend=backend, n_jobs=workers, temp_folder=str(folder), **limit
-            ),
+        with joblib.parallel_config(
+            backend=backend, n_jobs=workers, max_nbytes=None, temp_folder=TEMPORARY, **limit
         ):
             try:
                 parallel = joblib.Parallel(batch_size=1, return_as="generator_unordered")
@@ -293,38 +273,26 @@ def _joblib(backend: str, workers: int) -> Iterator[joblib.Parallel]:
             get_reusable_executor(reuse=True).shutdown(wait=True)
 
 
-def _temporary() -> Path:
-    """Return a folder for joblib's temporary files, whose tracker takes short names in ASCII."""
-    for folder in (tempfile.gettempdir(), "/tmp", "/var/tmp"):
-        if folder.isascii() and len(folder) < 200 and Path(folder).is_dir():
-            return Path(folder)
-    raise ValueError(
-        f"TMPDIR must be a folder with a short name in ASCII, got {tempfile.gettempdir()!r}"
-    )
-
-
 def _results(stored: Mapping[Task, Stored], store: Store) -> Results:
     tables, failures, origins = [], [], []
-    for task, result in stored.items():
+    for task, (run, provenance) in stored.items():
         arm = task.arm
-        clashing = sorted(set(arm.labels) & set(result.table))
+        clashing = sorted(set(arm.labels) & set(run.table))
         require(not clashing, f"labels of arm {arm.name!r}", clashing, "no columns of its table")
         for position, (column, value) in enumerate({"arm": arm.name, **arm.labels}.items()):
-            result.table.insert(position, column, value)
-        tables.append(result.table)
-        failures += [{"arm": arm.name, **dataclasses.asdict(one)} for one in result.failures]
-        made = dict(result.provenance)
-        del made["code"], made["format"], made["environment"]
-        made["config"] = canonical_json(made["config"])
-        made["snapshots"] = tuple(made["snapshots"])
-        libraries, settings = made.pop("versions"), made.pop("platform")
-        first = {"arm": arm.name, "seed": made.pop("seed"), "digest": task.digest}
-        origins.append({**first, **made, "machine": settings["machine"], **libraries})
+            run.table.insert(position, column, value)
+        tables.append(run.table)
+        failures += [{"arm": arm.name, **dataclasses.asdict(one)} for one in run.failures]
+        made = dict(provenance)
+        first = {"arm": arm.name, "seed": task.seed, "digest": task.digest}
+        libraries, machine = made.pop("versions"), made.pop("platform")["machine"]
+        made |= {"config": canonical_json(made["config"]), "snapshots": tuple(made["snapshots"])}
+        origins.append({**first, **made, "machine": machine, **libraries})
     columns = {"arm": str, "seed": np.int64, "episode": np.int64, "reason": str}
     return Results(
         table=pd.concat(tables, ignore_index=True),
         failures=pd.DataFrame(failures, columns=list(columns)).astype(columns),
-        provenance=pd.DataFrame(origins),
+        provenance=pd.DataFrame(origins).drop(columns=["code", "environment", "format"]),
         _store=store,
         _arms={task.arm.name: task.arm for task in stored},
     )

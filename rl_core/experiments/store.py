@@ -1,6 +1,6 @@
 """The result store: each result under the digest of what made it, in open formats.
 
-A result is one seed of one arm, in a folder of its own, named by its digest:
+A result is the run of one seed of one arm, in a folder of its own, named by its digest:
 
     results/<digest>/table.parquet    the tidy table
     results/<digest>/arrays.npz       what was learned, in NumPy's format, without pickle
@@ -19,45 +19,25 @@ import json
 import os
 import shutil
 import uuid
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from rl_core.kernels.arrays import Arrays
-from rl_core.training import Failure
+from rl_core.training import Failure, Run
 
 TABLE, ARRAYS, RECORD = "table.parquet", "arrays.npz", "record.json"
 
 
 class DamagedResultError(Exception):
     """A stored file is not what was written; the message names it."""
-
-
-@dataclass(frozen=True)
-class Stored:
-    """What the store holds of one seed, without its arrays.
-
-    Attributes
-    ----------
-    table : pandas.DataFrame
-        The seed's rows.
-    failures : tuple of Failure
-        Empty, or the one failure of the seed.
-    provenance : dict
-        What made it, where and when, in terms of JSON.
-    """
-
-    table: pd.DataFrame
-    failures: tuple[Failure, ...]
-    provenance: dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -75,27 +55,21 @@ class Store:
     >>> import pandas as pd
     >>> from pathlib import Path
     >>> from rl_core.experiments.store import Store
+    >>> from rl_core.training import Run
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     store = Store(Path(folder))
     ...     table = pd.DataFrame({"seed": [7], "episode": [1], "steps": [93]})
-    ...     store.write("ab12", table, {"weights": np.zeros((2, 3))}, (), {"seed": 7})
-    ...     stored, arrays = store.read("ab12"), store.read_arrays("ab12")
-    >>> stored.table.steps.tolist(), arrays["weights"].shape, store.read("cd34")
-    ([93], (2, 3), None)
+    ...     store.write("ab12", Run(table, {"weights": np.zeros((1, 3))}), {"seed": 7})
+    ...     (run, provenance), arrays = store.read("ab12"), store.read_arrays("ab12")
+    >>> run.table.steps.tolist(), arrays["weights"].shape, provenance
+    ([93], (1, 3), {'seed': 7})
     """
 
     path: Path
 
-    def write(
-        self,
-        digest: str,
-        table: pd.DataFrame,
-        arrays: Mapping[str, NDArray[Any]],
-        failures: Sequence[Failure],
-        provenance: Mapping[str, Any],
-    ) -> None:
-        """Store a result under `digest`, atomically.
+    def write(self, digest: str, run: Run, provenance: Mapping[str, Any]) -> None:
+        """Store a result under `digest`, atomically: a run, and where it comes from in JSON.
 
         An intact result that is already there (another process made it) stays; a damaged one is
         replaced.
@@ -105,39 +79,37 @@ class Store:
         TypeError
             An array is neither of numbers nor of truth values.
         """
-        files = {
-            TABLE: _parquet(pa.Table.from_pandas(table, preserve_index=False)),
-            ARRAYS: _npz(arrays),
-        }
+        table: bytes = run.table.to_parquet(index=False, compression="zstd")
+        files = {TABLE: table, ARRAYS: _npz(run.arrays)}
         record = {
             "digest": digest,
             "files": {name: hashlib.sha256(data).hexdigest() for name, data in files.items()},
-            "failures": [asdict(failure) for failure in failures],
+            "failures": [asdict(failure) for failure in run.failures],
             "provenance": dict(provenance),
         }
-        with scratch(self.path / "scratch") as folder:
+        with self.scratch() as folder:
             for name, data in {**files, RECORD: _sealed(record)}.items():
                 _write_flushed(folder / name, data)
             _flush(folder)
             self._place(folder, digest)
 
-    def read(self, digest: str) -> Stored | None:
-        """Return the result under `digest`, all of its files verified, or None if there is none.
+    def read(self, digest: str) -> tuple[Run, dict[str, Any]]:
+        """Return the run under `digest`, without its arrays, and its provenance; all verified.
 
         Raises
         ------
+        KeyError
+            There is no such result.
         DamagedResultError
             A file is missing or is not the one that was written.
         """
-        found = self._verified(digest)
-        if found is None:
-            return None
-        record, files = found
-        return Stored(
-            table=_columns(files[TABLE]).to_pandas(use_threads=False),
-            failures=tuple(Failure(**failure) for failure in record["failures"]),
-            provenance=record["provenance"],
-        )
+        record, files = self._verified(digest)
+        # In this thread alone: Arrow's may let go of their bytes only when Python shuts down, which
+        # aborts the process (https://github.com/apache/arrow/issues/34314).
+        parquet = pq.ParquetFile(pa.BufferReader(files[TABLE]), pre_buffer=False)
+        table = parquet.read(use_threads=False).to_pandas(use_threads=False)
+        failures = tuple(Failure(**failure) for failure in record["failures"])
+        return Run(table, failures=failures), record["provenance"]
 
     def read_arrays(self, digest: str) -> Arrays:
         """Return the arrays of the result under `digest`, bit for bit as they were written.
@@ -149,24 +121,39 @@ class Store:
         DamagedResultError
             A file is missing or is not the one that was written.
         """
-        found = self._verified(digest)
-        if found is None:
-            raise KeyError(f"no result {digest} in the store")
-        with np.load(io.BytesIO(found[1][ARRAYS])) as arrays:
+        _, files = self._verified(digest)
+        with np.load(io.BytesIO(files[ARRAYS])) as arrays:
             return dict(arrays)
 
     def clean(self) -> None:
         """Remove what killed writers left behind."""
-        sweep(self.path / "scratch", "*")
+        for folder in {path.with_suffix("") for path in (self.path / "scratch").glob("*")}:
+            with contextlib.suppress(Timeout, OSError), _lock_of(folder, timeout=0):
+                shutil.rmtree(folder, ignore_errors=True)
 
-    def _verified(self, digest: str) -> tuple[dict[str, Any], dict[str, bytes]] | None:
+    @contextlib.contextmanager
+    def scratch(self) -> Iterator[Path]:
+        """Make an empty folder, locked until the block ends; then remove it, unless it was renamed.
+
+        The lock goes with the process, however that ends, so that `clean` can tell the dead.
+        """
+        folder = self.path / "scratch" / uuid.uuid4().hex
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with _lock_of(folder):
+            folder.mkdir()
+            try:
+                yield folder
+            finally:
+                shutil.rmtree(folder, ignore_errors=True)
+
+    def _verified(self, digest: str) -> tuple[dict[str, Any], dict[str, bytes]]:
         """Return the record and the files of a result, each checked against its checksum.
 
         What is parsed later are these very bytes.
         """
         folder = self.path / "results" / digest
         if not folder.exists():
-            return None
+            raise KeyError(f"no result {digest} in the store")
         try:
             record = _unsealed(folder / RECORD)
             files = {name: (folder / name).read_bytes() for name in (TABLE, ARRAYS)}
@@ -183,47 +170,20 @@ class Store:
         """Rename a finished folder into `results`, unless an intact result is there."""
         target = self.path / "results" / digest
         target.parent.mkdir(parents=True, exist_ok=True)
-        while True:
-            try:
-                os.rename(folder, target)  # fails if there is a folder with files in it
-                break
-            except OSError:
-                if not target.exists():
-                    raise
-            try:
-                if self._verified(digest) is not None:
-                    return
-            except DamagedResultError:
-                self._discard(target)
-        _flush(target.parent)
-
-    def _discard(self, target: Path) -> None:
-        """Move a damaged result out of the way at once, then remove its files."""
-        with scratch(self.path / "scratch") as away, contextlib.suppress(FileNotFoundError):
-            os.rename(target, away / "damaged")  # unless another process was quicker
-
-
-@contextlib.contextmanager
-def scratch(parent: Path, prefix: str = "") -> Iterator[Path]:
-    """Make an empty folder, locked until the block ends; then remove it, unless it was renamed.
-
-    The lock goes with the process, however that ends, so that `sweep` can tell the dead.
-    """
-    parent.mkdir(parents=True, exist_ok=True)
-    folder = parent / f"{prefix}{uuid.uuid4().hex}"
-    with _lock_of(folder):
-        folder.mkdir()
         try:
-            yield folder
-        finally:
-            shutil.rmtree(folder, ignore_errors=True)
-
-
-def sweep(parent: Path, pattern: str) -> None:
-    """Remove the folders of that kind whose makers are dead, and their locks."""
-    for folder in {path.with_suffix("") for path in parent.glob(pattern)}:
-        with contextlib.suppress(Timeout, OSError), _lock_of(folder, timeout=0):
-            shutil.rmtree(folder, ignore_errors=True)
+            self._verified(digest)
+            return
+        except KeyError:
+            pass
+        except DamagedResultError:  # out of the way at once, unless another process was quicker
+            with self.scratch() as away, contextlib.suppress(FileNotFoundError):
+                os.rename(target, away / "damaged")
+        try:
+            os.rename(folder, target)
+        except OSError:
+            if not target.exists():  # so no other process was quicker
+                raise
+        _flush(target.parent)
 
 
 @contextlib.contextmanager
@@ -248,23 +208,6 @@ def _npz(arrays: Mapping[str, NDArray[Any]]) -> bytes:
     sink = io.BytesIO()
     np.savez_compressed(sink, **arrays)  # type: ignore[arg-type]
     return sink.getvalue()
-
-
-def _parquet(table: pa.Table) -> bytes:
-    """Return `table` as a Parquet file."""
-    sink = pa.BufferOutputStream()
-    pq.write_table(table, sink, compression="zstd")
-    data: bytes = sink.getvalue().to_pybytes()
-    return data
-
-
-def _columns(data: bytes) -> pa.Table:
-    """Read a Parquet file in this thread alone.
-
-    Arrow's threads may let go of `data` only when Python shuts down, which aborts the process
-    (https://github.com/apache/arrow/issues/34314).
-    """
-    return pq.ParquetFile(pa.BufferReader(data), pre_buffer=False).read(use_threads=False)
 
 
 def _sealed(record: Mapping[str, Any]) -> bytes:

@@ -9,7 +9,7 @@ import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, NamedTuple
 
 from rl_core import sources
 from rl_core.experiments import provenance
@@ -42,8 +42,7 @@ class Task:
     digest: str
 
 
-@dataclass(frozen=True)
-class Outcome:
+class Outcome(NamedTuple):
     """What a worker sends back; the result itself is in the store.
 
     Attributes
@@ -52,21 +51,14 @@ class Outcome:
         The arm's name.
     env_steps : int
         Environment steps done.
-    message, details : str
-        If an exception ended it: arm, seed and what was raised, and the traceback in the worker.
-        In words, since not every exception can travel.
+    error : RuntimeError or None
+        If an exception ended it: arm, seed and what was raised, in words, since not every exception
+        can travel. A note holds the traceback in the worker.
     """
 
     arm: str
-    env_steps: int = 0
-    message: str = ""
-    details: str = ""
-
-    def exception(self) -> RuntimeError:
-        """Return an exception that tells all of this."""
-        error = RuntimeError(self.message)
-        error.add_note(self.details)
-        return error
+    env_steps: int
+    error: RuntimeError | None
 
 
 def run_task(task: Task, store: Store, parent: int) -> Outcome:
@@ -81,10 +73,12 @@ def run_task(task: Task, store: Store, parent: int) -> Outcome:
     """
     _end_with(parent)
     try:
-        return Outcome(task.arm.name, _train(task, store))
+        return Outcome(task.arm.name, _train(task, store), None)
     except Exception as error:
-        message = f"arm {task.arm.name!r}, seed {task.seed}: {type(error).__name__}: {error}"
-        return Outcome(task.arm.name, 0, message, traceback.format_exc())
+        kind = type(error).__name__
+        told = RuntimeError(f"arm {task.arm.name!r}, seed {task.seed}: {kind}: {error}")
+        told.add_note(traceback.format_exc())
+        return Outcome(task.arm.name, 0, told)
 
 
 def _train(task: Task, store: Store) -> int:
@@ -99,16 +93,16 @@ def _train(task: Task, store: Store) -> int:
     computed, seconds = time.thread_time() - computed, time.perf_counter() - started
     _check_run(run, task.seed)
     env_steps = int(run.table["env_steps"].max()) if "env_steps" in run.table else 0
-    made = {
+    origin = {
+        **task.identity,
+        "seed": task.seed,
         "seconds": seconds,
         "processor_seconds": computed,
         "env_steps_per_second": env_steps / seconds,
         "processor": provenance.processor(),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
     }
-    arrays = {name: array[0] for name, array in run.arrays.items()}
-    origin = {**task.identity, "seed": task.seed, **made}
-    store.write(task.digest, run.table, arrays, run.failures, origin)
+    store.write(task.digest, run, origin)
     return env_steps
 
 
@@ -146,10 +140,8 @@ def _end_with(parent: int) -> None:
 def _check_process(identity: Mapping[str, Any]) -> None:
     """Check that this process has the code, versions and settings that the digest tells of."""
     sources.check_loaded(identity["code"])
-    for kind, found in (
-        ("versions", provenance.versions()),
-        ("platform", provenance.platform_settings()),
-    ):
+    here = {"versions": provenance.versions(), "platform": provenance.platform_settings()}
+    for kind, found in here.items():
         if found != identity[kind]:
             raise RuntimeError(
                 f"{kind} of the worker must be those of the process that started the experiment, "

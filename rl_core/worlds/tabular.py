@@ -97,17 +97,14 @@ def played(env: EnvironmentLike) -> Played:
     Traceback (most recent call last):
     ValueError: env must have a Discrete observation space, got Box([-1.2  -0.07], [0.6  0.07], ...
     """
-    made = opened(env)
-    match made.observation_space, made.action_space:
-        case spaces.Discrete() as observations, spaces.Discrete() as actions:
-            return Played(made, observations, actions)
-        case spaces.Discrete(), other:
-            told = f"env must have a Discrete action space, got {other}"
-        case other, _:
-            told = f"env must have a Discrete observation space, got {other}"
-    if made is not env:
-        made.close()
-    raise ValueError(told)
+    made: Any = opened(env)
+    for kind in ("observation", "action"):
+        space = getattr(made, f"{kind}_space")
+        if not isinstance(space, spaces.Discrete):
+            if made is not env:
+                made.close()
+            raise ValueError(f"env must have a Discrete {kind} space, got {space}")
+    return Played(made, made.observation_space, made.action_space)
 
 
 def known_model(world: Played) -> MDP | None:
