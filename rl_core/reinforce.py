@@ -260,10 +260,8 @@ def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator)
     biases = config.network.biases
     parameters = policies.initial_parameters(policy, config.policy, rng)
 
-    def layers() -> Arrays:
-        named = likelihood.unpack(policy, parameters)
-        return {name: array for name, array in named.items() if biases or "bias" not in name}
-
+    named = likelihood.unpack(policy, parameters)
+    layers = {name: array for name, array in named.items() if biases or "bias" not in name}
     learn: Callable[..., None]
     if config.engine == "torch":
         vector = torch.from_numpy(parameters)  # actor and module share its memory
@@ -276,7 +274,7 @@ def _make_agent(config: ReinforceConfig, world: World, rng: np.random.Generator)
         learn = partial(
             likelihood.learn, likelihood.make_learner(policy, parameters, learns, *rates)
         )
-    return _Agent(likelihood.make_actor(policy, parameters), learn, layers)
+    return _Agent(likelihood.make_actor(policy, parameters), learn, lambda: layers)
 
 
 def _log_sigma(config: ReinforceConfig, start: torch.Tensor) -> torch.nn.Parameter:
