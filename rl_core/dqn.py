@@ -289,14 +289,13 @@ def _make_learner(
     biases = config.network.biases
     parameters = networks.xavier_uniform(sizes, rng)
 
-    def layers() -> Arrays:
-        named = networks.unpack(sizes, parameters)
-        return {name: array for name, array in named.items() if biases or "bias" not in name}
-
+    named = networks.unpack(sizes, parameters)
+    layers = {name: array for name, array in named.items() if biases or "bias" not in name}
     if config.engine == "torch":
         network = modules.perceptron(sizes, parameters, biases)
-        return TorchLearner(network, settings, epsilon), layers
-    return q_update.make_learner(sizes, parameters, settings, epsilon, biases=biases), layers
+        return TorchLearner(network, settings, epsilon), lambda: layers
+    learner = q_update.make_learner(sizes, parameters, settings, epsilon, biases=biases)
+    return learner, lambda: layers
 
 
 def _train(world: World, config: DQNConfig, training: Training) -> None:

@@ -251,10 +251,8 @@ def _make_agent(
     biases = config.network.biases
     parameters = policies.initial_parameters(policy, config.policy, rng)
 
-    def layers() -> Arrays:
-        named = likelihood.unpack(policy, parameters)
-        return {name: array for name, array in named.items() if biases or "bias" not in name}
-
+    named = likelihood.unpack(policy, parameters)
+    layers = {name: array for name, array in named.items() if biases or "bias" not in name}
     learn: Callable[..., None]
     if config.engine == "torch":
         # Actor and module share the memory of the parameters.
@@ -267,7 +265,7 @@ def _make_agent(
         learn = partial(
             likelihood.learn, likelihood.make_learner(policy, parameters, learns, *rates)
         )
-    return likelihood.make_actor(policy, parameters), learn, layers
+    return likelihood.make_actor(policy, parameters), learn, lambda: layers
 
 
 def _log_sigma(config: ReinforceConfig, start: F32) -> torch.nn.Parameter:

@@ -1,6 +1,7 @@
 """Episodes played compiled and plain: one loop, the same bits."""
 
 import random
+import sys
 
 import gymnasium
 import numpy as np
@@ -197,3 +198,13 @@ def test_global_random_states_are_left_alone():
         episode(world, through_torch(actor), rng, 50)
     assert torch.equal(before[0], torch.get_rng_state())
     assert before[1:] == (str(np.random.get_state()), random.getstate())  # noqa: NPY002
+
+
+def test_a_generator_is_released_after_its_episodes():
+    world, rng = open_world("MountainCar-v0"), np.random.default_rng(0)
+    policy = make_policy(Categorical(), (4,), 2, 3, 0)
+    actor = likelihood.make_actor(policy, np.zeros(27, np.float32))
+    held = sys.getrefcount(rng)
+    for _ in range(3):
+        play_episode(world, actor, rng, 10, Trajectory(2, 1))
+    assert sys.getrefcount(rng) == held

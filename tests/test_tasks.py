@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from toy_task import LENGTH, NOWHERE, RIGHT, Corridor
 
+from rl_core.worlds.acrobot import _in_doubt
 from rl_core.worlds.tasks import Task, task
 from rl_core.worlds.twins import TASKS, twin
 
@@ -162,6 +163,15 @@ def test_cost_is_charged_on_the_force_before_it_is_clipped():
 
 def test_goal_pays_a_hundred_and_ends_the_episode():
     assert step("MountainCarContinuous-v0", np.array([0.44, 0.05, 1.0]), 0.0) == (100.0, True)
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e-3, 1.0, 30.0])
+def test_a_square_that_is_not_in_doubt_is_numpys(scale):
+    numbers = np.random.default_rng(0).uniform(-scale, scale, 50_000)
+    certain = [x for x in numbers if not _in_doubt(x, x * x)]
+    assert len(certain) > 0.96 * numbers.size
+    assert [x * x for x in certain] == [x**2 for x in certain]
+    assert any(x * x != x**2 for x in numbers)  # there is something to doubt
 
 
 def test_acrobot_conserves_energy_without_torque():

@@ -5,7 +5,7 @@ import hashlib
 import io
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, Literal, ParamSpec, TypeVar, cast
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 from numba.core import caching
@@ -52,7 +52,25 @@ def compiled(function: Callable[_Arguments, _Result]) -> Callable[_Arguments, _R
     >>> add(1, 2)
     3
     """
-    return _compiled(function, "never")
+    return _compiled(function, inline="never")
+
+
+def uncounted(function: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]:
+    """Compile like `compiled`, without counting references to arrays.
+
+    For loops that only borrow what they are given: they make no array, return none, and from Python
+    are given no generator. Numba counts at every slice, which takes longer than a small network.
+
+    Examples
+    --------
+    >>> from rl_core.kernels.compiled import uncounted
+    >>> @uncounted
+    ... def add(a: int, b: int) -> int:
+    ...     return a + b
+    >>> add(1, 2)
+    3
+    """
+    return _compiled(function, inline="never", _nrt=False)
 
 
 def inlined(function: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]:
@@ -70,13 +88,14 @@ def inlined(function: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Re
     >>> add(1, 2)
     3
     """
-    return _compiled(function, "always")
+    return _compiled(function, inline="always")
 
 
 def _compiled(
-    function: Callable[_Arguments, _Result], inline: Literal["never", "always"]
+    function: Callable[_Arguments, _Result], *, inline: str, _nrt: bool = True
 ) -> Callable[_Arguments, _Result]:
-    kernel: Any = numba.njit(nogil=True, error_model="numpy", inline=inline)(function)
+    options: Any = {"nogil": True, "error_model": "numpy", "inline": inline, "_nrt": _nrt}
+    kernel: Any = numba.njit(**options)(function)
     code = sources.loaded_code(function.__module__)
     if code and not _settings.DISABLE_JIT:
         # RuntimeError: no folder can be written. ValueError: its name cannot be encoded.

@@ -15,7 +15,7 @@ import numpy as np
 
 from rl_core.kernels import networks
 from rl_core.kernels.arrays import F32, F64, I64
-from rl_core.kernels.compiled import compiled, inlined
+from rl_core.kernels.compiled import compiled, inlined, uncounted
 
 
 class Policy(NamedTuple):
@@ -66,7 +66,7 @@ def _write_features(policy: Policy, observation: F32, features: F32) -> None:
         features[observation.size] = 1.0
 
 
-@compiled
+@uncounted
 def _gaussian_mean(policy: Policy, units: F32, k: int) -> np.float32:
     """Mean of component k of the action, from the units of a network that saw one state."""
     n_features = policy.sizes[0]
@@ -79,10 +79,12 @@ def _gaussian_mean(policy: Policy, units: F32, k: int) -> np.float32:
     return mean
 
 
-@compiled
+@uncounted
 def _choose_categorical(scores: F32, uniform: float) -> int:
     """First k whose cumulative probability exceeds `uniform`; overwrites the scores."""
-    highest = scores.max()
+    highest = scores[0]
+    for k in range(1, scores.size):
+        highest = max(highest, scores[k])
     total = 0.0
     for k in range(scores.size):
         scores[k] = np.exp(scores[k] - highest)
@@ -191,7 +193,7 @@ def draw_action(policy: Policy, log_sigma: F32, units: F32, noise: F64, action: 
         action[k] = _gaussian_mean(policy, units, k) + np.exp(log_sigma[k]) * noise[k]
 
 
-@compiled
+@uncounted
 def _categorical_deltas(
     policy: Policy, actions: F32, weights: F32, units: F32, deltas: F32
 ) -> None:
@@ -211,7 +213,7 @@ def _categorical_deltas(
             delta[j, k] = weights[k] * (delta[j, k] / total - taken)
 
 
-@compiled
+@uncounted
 def _gaussian_deltas(
     policy: Policy,
     parameters: F32,
@@ -242,7 +244,7 @@ def _gaussian_deltas(
                 deltas[first_output + c, k] = slope
 
 
-@compiled
+@uncounted
 def likelihood_gradient(
     policy: Policy,
     parameters: F32,

@@ -25,7 +25,7 @@ import numpy as np
 
 from rl_core.kernels import choices, networks
 from rl_core.kernels.arrays import F32, F64, I64
-from rl_core.kernels.compiled import compiled, compiled_as
+from rl_core.kernels.compiled import compiled, compiled_as, uncounted
 from rl_core.kernels.replay import Memory, number
 
 STEPS, UPDATES, COPIES, KEPT, ACTION = range(5)
@@ -167,7 +167,7 @@ def _q_values(learner: Learner, observation: F32) -> F64:
     return units[units.size - learner.sizes[-1] :].astype(np.float64)
 
 
-@compiled
+@uncounted
 def _next_values(learner: Learner, memory: Memory) -> None:
     """See to it that V = max_a' Q(s', a'; theta-) is up to date in the sampled slots."""
     n_in, n_out = learner.sizes[0], learner.sizes[-1]
@@ -190,7 +190,7 @@ def _next_values(learner: Learner, memory: Memory) -> None:
         memory.next_values[learner.stale[k]] = highest
 
 
-@compiled
+@uncounted
 def target(reward: float, next_value: float, end: bool, gamma: float, through_end: bool) -> float:
     """The target y of a transition: r + gamma V, or r where it ends and nothing comes after.
 
@@ -213,7 +213,7 @@ def target(reward: float, next_value: float, end: bool, gamma: float, through_en
     return reward if end and not through_end else reward + gamma * next_value
 
 
-@compiled
+@uncounted
 def loss_gradient(learner: Learner, memory: Memory) -> float:
     """L(theta) of the sampled batch; its gradient is left in `learner.gradient`.
 

@@ -69,4 +69,5 @@ class CartPole:
     @staticmethod
     def observe(state: State, observation: Observation) -> None:
         """Observe the whole state."""
-        observation[:] = state
+        for i in range(4):
+            observation[i] = state[i]

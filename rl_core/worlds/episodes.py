@@ -16,7 +16,7 @@ from numba.extending import overload
 from rl_core.kernels import likelihood
 from rl_core.kernels.arrays import F32, F64
 from rl_core.kernels.choices import EPSILON_GREEDY, choose
-from rl_core.kernels.compiled import compiled
+from rl_core.kernels.compiled import compiled, uncounted
 from rl_core.kernels.likelihood import Actor, Policy
 from rl_core.worlds.discretise import Grid, cell
 from rl_core.worlds.environments import TaskWorld, World, step
@@ -198,7 +198,13 @@ def play(
     return t, False, False
 
 
-_play_compiled = compiled(play)
+_play_uncounted = uncounted(play)
+# The generator comes from Python, and would never be released by what does not count.
+_play_compiled = compiled(
+    lambda stepper, actor, rng, observations, actions, rewards, t, stop: _play_uncounted(
+        stepper, actor, rng, observations, actions, rewards, t, stop
+    )
+)
 
 
 def play_episode(

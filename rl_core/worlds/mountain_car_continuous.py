@@ -5,7 +5,7 @@ import math
 import numpy as np
 from gymnasium import spaces
 
-from rl_core.kernels.compiled import compiled
+from rl_core.kernels.compiled import uncounted
 from rl_core.worlds.mountain_car import MAX_POSITION, MAX_SPEED, MIN_POSITION, OBSERVATIONS, SLOPE
 from rl_core.worlds.tasks import Action, Observation, State, clip, task
 
@@ -13,7 +13,7 @@ _GOAL = 0.45
 _PUSH = 0.0015
 
 
-@compiled
+@uncounted
 def _single(value: float) -> float:
     """Round to single precision. Sums and products of two singles, rounded so, are exact twins."""
     return np.float64(np.float32(value))

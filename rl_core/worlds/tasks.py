@@ -310,6 +310,7 @@ def _first_class(name: str, function: Callable[..., Any]) -> Any:
     signature, file = _SIGNATURES[name], Path(function.__code__.co_filename)
     own = file.is_relative_to(Path(__file__).parents[1])
     options = {"nopython": True, "nogil": True, "error_model": "numpy", "boundscheck": True}
+    options["_nrt"] = not own or name == "start"  # others may make arrays; see `uncounted`
     made: Any = _FirstClass(function, targetoptions=options)
     if own:  # others' machine code would be kept under a stamp that does not know their constants
         kept: Any = compiled(function)
