@@ -33,6 +33,7 @@ from rl_core.checks import floats, generator, instance, integer, number, require
 from rl_core.dqn import DQNConfig
 from rl_core.identity import canonical_json, describe, restored
 from rl_core.kernels import likelihood, networks
+from rl_core.kernels.arrays import BYTE
 from rl_core.kernels.likelihood import Actor, Policy
 from rl_core.mdp import MDP
 from rl_core.policies import MLP, Categorical, Gaussian, make_policy
@@ -45,7 +46,6 @@ from rl_core.worlds.discretise import (
     make_grid,
 )
 from rl_core.worlds.environments import (
-    BYTE,
     EnvironmentLike,
     GymnasiumWorld,
     World,
