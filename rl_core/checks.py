@@ -134,9 +134,7 @@ def truth(name: str, value: object) -> bool:
     >>> truth("biases", np.True_)
     True
     """
-    if not isinstance(value, bool | np.bool_):
-        _refuse(TypeError, name, value, "a bool")
-    return bool(value)
+    return bool(instance(name, value, bool | np.bool_, "a bool"))
 
 
 def one_of(name: str, value: object, words: Collection[str]) -> str:
@@ -150,10 +148,9 @@ def one_of(name: str, value: object, words: Collection[str]) -> str:
     ValueError: engine must be one of 'compiled', 'torch', got 'jax'
     """
     allowed = f"one of {', '.join(map(repr, words))}"
-    if not isinstance(value, str):
-        _refuse(TypeError, name, value, allowed)
-    require(value in words, name, value, allowed)
-    return str(value)
+    word: str = instance(name, value, str, allowed)
+    require(word in words, name, value, allowed)
+    return str(word)
 
 
 def optional(name: str, value: object, check: Callable[..., Any], *bounds: Any) -> Any:

@@ -32,6 +32,7 @@ from rl_core.checks import floats, generator, instance, integer, require, truth
 from rl_core.dqn import DQNConfig
 from rl_core.identity import canonical_json, describe, restored
 from rl_core.kernels import likelihood, networks
+from rl_core.kernels.arrays import BYTE
 from rl_core.kernels.likelihood import Actor, Policy
 from rl_core.mdp import MDP
 from rl_core.policies import MLP, Categorical, Gaussian, make_policy
@@ -148,7 +149,7 @@ class Agent:
         require(fits, "observation", f"{seen.dtype} of shape {seen.shape}", allowed)
         first = seen.reshape(-1, n_seen).astype(np.float32)
         if (seen if self.spaces is None else self.spaces[0]).dtype == np.uint8:
-            first *= environments.BYTE
+            first *= BYTE
         actions = np.empty((len(first), policy.action_width), np.float32)
         draw = self.rng.standard_normal if policy.gaussian else self.rng.random
         for one, action in zip(first, actions, strict=True):

@@ -45,7 +45,7 @@ def table(arms: Sequence[Arm], reported: Arm | str) -> pd.DataFrame:
     rows = [
         {
             "arm": arm.name,
-            "environment": arm.env_name,
+            "environment": str(arm.env),
             "episodes": arm.episodes,
             "differs": ", ".join(
                 f"{name}={value}"

@@ -11,7 +11,6 @@ from rl_core.experiments import provenance
 from rl_core.identity import describe, import_path
 from rl_core.training import Run
 from rl_core.worlds import names
-from rl_core.worlds.names import Make
 
 FORMAT = 4  # of what the store keeps; part of every digest
 TAKEN = {"arm", "seed", "episode", "steps", "return", "terminated", "env_steps"}  # columns
@@ -96,14 +95,6 @@ class Arm:
         """The algorithm's import path, "module:function"."""
         return import_path("algorithm", self.algorithm, "a function")
 
-    @property
-    def env_name(self) -> str:
-        """The environment as one text."""
-        if isinstance(self.env, Make) and self.env.arguments:
-            arguments = ", ".join(f"{key}={value!r}" for key, value in self.env.arguments.items())
-            return f"{self.env.id}({arguments})"
-        return self.env.id if isinstance(self.env, Make) else self.env
-
     def check(self) -> dict[str, Any]:
         """Return the arm's identity, or raise what would stop it; run nothing.
 
@@ -145,7 +136,7 @@ class Arm:
         return {
             "format": FORMAT,
             "algorithm": self.algorithm_name,
-            "env": self.env_name,
+            "env": str(self.env),
             "config": config,
             "episodes": self.episodes,
             "snapshots": list(self.snapshots),

@@ -14,3 +14,6 @@ Bools = NDArray[np.bool_]
 Ints = NDArray[np.signedinteger]
 Arrays = dict[str, NDArray[Any]]
 """Arrays by their names."""
+
+BYTE = np.float32(1 / 255)
+"""What a byte of an observation counts."""

@@ -19,7 +19,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from rl_core.checks import in_memory
-from rl_core.kernels.arrays import F32, F64, I64, Bools, Bytes
+from rl_core.kernels.arrays import BYTE, F32, F64, I64, Bools, Bytes
 from rl_core.kernels.compiled import compiled
 
 NEVER = -1
@@ -54,10 +54,6 @@ class Memory(NamedTuple):
     next_values: F32
     stamps: I64
     stored: I64
-
-
-BYTE = np.float32(1 / 255)
-"""What a byte of an observation counts."""
 
 
 def check_room(name: str, capacity: int, n_observations: int, as_bytes: bool) -> None:
@@ -139,17 +135,19 @@ def number(kept: Any, slot: int, i: int) -> float:
     return float(scaled(kept[slot, i : i + 1])[0])
 
 
-# What it means in compiled code is decided by the type of what is kept.
+def _float(kept: Any, slot: int, i: int) -> Any:
+    return kept[slot, i]
+
+
+def _byte(kept: Any, slot: int, i: int) -> Any:
+    return kept[slot, i] * BYTE
+
+
+# What they mean in compiled code is decided by the type of what is kept.
 overload(keep, strict=False)(
     lambda room, observation: _keep_bytes if room.dtype is uint8 else _keep_floats
 )
-overload(number)(
-    lambda kept, slot, i: (
-        (lambda kept, slot, i: kept[slot, i] * BYTE)
-        if kept.dtype is uint8
-        else (lambda kept, slot, i: kept[slot, i])
-    )
-)
+overload(number, strict=False)(lambda kept, slot, i: _byte if kept.dtype is uint8 else _float)
 
 
 @compiled

@@ -341,9 +341,7 @@ def gridded(
     >>> gridded("MountainCar-v0", bins=10).shape
     (100, 3)
     """
-    task = task_of(env)
-    instance("env", env if task is None else task, Task, "a compiled task")
-    assert task is not None
+    task: Task = instance("env", task_of(env) or env, Task, "a compiled task")
     grid = make_grid(task.observation_space, bins)
     actions = action_levels(task.action_space, levels)
     seen = np.zeros(task.n_observations, np.float32)

@@ -22,8 +22,7 @@ from numpy import copyto
 from numpy.typing import NDArray
 
 from rl_core.checks import distinct_seeds, instance
-from rl_core.kernels.arrays import F32
-from rl_core.kernels.compiled import inlined
+from rl_core.kernels.arrays import BYTE, F32
 from rl_core.worlds.names import Make, find, make_environment
 from rl_core.worlds.tasks import Kernel, Task
 from rl_core.worlds.twins import twin
@@ -34,10 +33,6 @@ EnvironmentLike = (
 """An id, an id with arguments, an import path, a task, an environment, or a function making one."""
 
 _NO_NUMBERS: Any = None
-
-
-BYTE = np.float32(1 / 255)
-"""What a byte of an observation counts."""
 
 
 class TaskWorld:
@@ -259,18 +254,13 @@ def step(stepper: Kernel | GymnasiumWorld, action: F32, following: F32) -> tuple
     return stepper.step(action, following)
 
 
-@inlined
-def _step_task(kernel: Kernel, action: F32, following: F32) -> tuple[float, bool, bool]:
-    reward, terminated = kernel.step(kernel.state, action)
-    kernel.observe(kernel.state, following)
+def _step_task(stepper: Kernel, action: F32, following: F32) -> tuple[float, bool, bool]:
+    reward, terminated = stepper.step(stepper.state, action)
+    stepper.observe(stepper.state, following)
     return reward, terminated, False
 
 
-overload(step, inline="always")(
-    lambda stepper, action, following: (
-        lambda stepper, action, following: _step_task(stepper, action, following)
-    )
-)
+overload(step, inline="always", strict=False)(lambda stepper, action, following: _step_task)
 
 
 def open_world(env: EnvironmentLike) -> World:

@@ -59,6 +59,10 @@ class Make:
         require(json.loads(text) == dict(self.arguments), "arguments", self.arguments, allowed)
         object.__setattr__(self, "arguments", json.loads(text))
 
+    def __str__(self) -> str:
+        arguments = ", ".join(f"{key}={value!r}" for key, value in self.arguments.items())
+        return f"{self.id}({arguments})" if arguments else self.id
+
     def __hash__(self) -> int:
         return hash((self.id, json.dumps(self.arguments, sort_keys=True)))
 
