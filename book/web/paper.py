@@ -48,7 +48,8 @@ STYLE = """
     h1, h2, h3, h4 { break-after: avoid; }
     p, li { orphans: 2; widows: 2; }
     figure, img, tr, .math, .thumbnail, .cell:has(img) { break-inside: avoid; }
-    .cell:has(img, video), .listing > p { break-after: avoid; }
+    .cell:has(img, video), .listing > p, caption, thead, thead tr, tbody tr:first-child {
+      break-after: avoid; }
     .cell:not(:has(> :not(details.hide))) { display: none; }
     .cell { margin: 0.4rem 0 !important; }
     .cell pre { margin: 0; padding: 0.4rem 0.6rem; }
