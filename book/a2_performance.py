@@ -86,15 +86,15 @@ captioned(bench[["benchmark", "against", "turns", "note"]], "Table B.2. How each
 parts = dict(iter(growth.groupby("what")))
 power = {what: study.power(parts[what]) for what in ("seeds", "episodes", "states")}
 law = study.serial_share(parts["cores"])
-premise("Value iteration takes more than in proportion to the states.", power["states"] > 1)
+of_a_state = study.each(parts["states"]) * 1e6
+premise("A state takes longer in the largest maze.", of_a_state.iloc[-1] > of_a_state.min())
 
 # %% tags=["hide-input"]
 for what, value in power.items():
     glue(f"power-{what}", value, display=False)
-of_a_state = study.each(parts["states"]) * 1e6
-glue("state-first", of_a_state.iloc[0], display=False)
-glue("state-last", of_a_state.iloc[-1], display=False)
-glue("states-last", f"{of_a_state.index[-1]:,}", display=False)
+for name, states in {"least": of_a_state.idxmin(), "last": of_a_state.index[-1]}.items():
+    glue(f"states-{name}", f"{states:,}", display=False)
+    glue(f"state-{name}", of_a_state[states], display=False)
 for name, share in {"share": law.share, "low": law.low, "high": law.high}.items():
     glue(f"serial-{name}", 100 * share, display=False)
 for cores in (2, 16):
@@ -136,9 +136,9 @@ drawings.growth(parts["states"], "states")
 # median; dashed: growth in proportion. Data: {download}`CSV <data/growth.csv>`.
 # :::
 #
-# With the number of states it grows to the power of {glue:text}`power-states:.2f`: from {glue:text}`state-first:.2f` µs a state in the smallest maze to
-# {glue:text}`state-last:.2f` in the one of {glue:text}`states-last`. A guess why it is more than in proportion: the larger the maze, the less of
-# it fits into the processor's caches. Table B.1 has the memory.
+# With the number of states it grows to the power of {glue:text}`power-states:.2f`, but unevenly: a state takes least in the maze of {glue:text}`states-least`
+# states, {glue:text}`state-least:.2f` µs, and {glue:text}`state-last:.2f` µs in the one of {glue:text}`states-last`. Two guesses: a small maze pays for what a call costs
+# in any case, and of a large one less fits into the processor's caches. Table B.1 has the memory.
 
 # %% tags=["hide-input"] mystnb={"image": {"alt": "Seconds of an experiment against cores, 1 to 64, on logarithmic axes: measured at one and two, a dotted computed curve with a band beyond, and the dashed line of proportional growth below."}}
 drawings.cores(parts["cores"], law)

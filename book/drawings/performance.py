@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter, ScalarFormatter
+from matplotlib.ticker import NullFormatter
 
 from drawings.look import BLACK, BLUE, GREY, ORANGE, label
 from studies.performance import Amdahl
@@ -69,8 +69,7 @@ def _panel(x: str, y: str) -> tuple[Figure, plt.Axes]:
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.yaxis.set_major_formatter(ScalarFormatter())
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.yaxis.set_minor_formatter(NullFormatter())
-    axes.yaxis.get_major_formatter().set_scientific(False)
     label(axes, x=f"{x} (log scale)", y=y)
     return figure, axes
