@@ -68,7 +68,9 @@ drawings.ratios(ratios)
 
 # %% tags=["hide-input"]
 captioned(
-    bench.drop(columns=["machine", "date", "note", "turns"]).fillna({"low": "", "high": ""}),
+    bench.drop(columns=["machine", "date", "note", "turns"])
+    .astype({"low": object, "high": object})
+    .fillna(""),
     "Table B.1. The same in numbers, and the memory. Low and high are the ends of the ratio's interval; what is held against a limit has none.",
     formats=dict.fromkeys(["rival", "ours", "ratio"], "{:.4g}"),
 )
