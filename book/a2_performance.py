@@ -96,7 +96,7 @@ for what, value in power.items():
     glue(f"power-{what}", value, display=False)
 for name, states in {"least": of_a_state.idxmin(), "last": of_a_state.index[-1]}.items():
     glue(f"states-{name}", f"{states:,}", display=False)
-    glue(f"state-{name}", of_a_state[states], display=False)
+    glue(f"state-{name}", float(of_a_state[states]), display=False)
 for name, share in {"share": law.share, "low": law.low, "high": law.high}.items():
     glue(f"serial-{name}", 100 * share, display=False)
 for cores in (2, 16):
