@@ -68,7 +68,9 @@ drawings.ratios(ratios)
 
 # %% tags=["hide-input"]
 captioned(
-    bench.drop(columns=["machine", "date", "note", "turns"]).fillna({"low": "", "high": ""}),
+    bench.drop(columns=["machine", "date", "note", "turns"])
+    .astype({"low": object, "high": object})
+    .fillna(""),
     "Table B.1. The same in numbers, and the memory. Low and high are the ends of the ratio's interval; what is held against a limit has none.",
     formats=dict.fromkeys(["rival", "ours", "ratio"], "{:.4g}"),
 )
@@ -94,7 +96,7 @@ for what, value in power.items():
     glue(f"power-{what}", value, display=False)
 for name, states in {"least": of_a_state.idxmin(), "last": of_a_state.index[-1]}.items():
     glue(f"states-{name}", f"{states:,}", display=False)
-    glue(f"state-{name}", of_a_state[states], display=False)
+    glue(f"state-{name}", float(of_a_state[states]), display=False)
 for name, share in {"share": law.share, "low": law.low, "high": law.high}.items():
     glue(f"serial-{name}", 100 * share, display=False)
 for cores in (2, 16):
