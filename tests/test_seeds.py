@@ -53,7 +53,8 @@ def test_every_study_uses_the_setting():
     modules = {name: vars(importlib.import_module(f"studies.{name}")) for name in STUDIES}
     without = {study for study, names in modules.items() if names.get("SEEDS") is not SEEDS}
     no_seeds = {"acrobot_angles", "calibration", "certificate", "fastest", "performance"}
-    no_seeds |= {"policy_maps", "potential", "q_learning_world"}
+    no_seeds |= {"policy_maps", "potential", "q_learning_world", "curves", "rewards"}
+    no_seeds |= {"by_sweeps", "dqn_numbers", "on_model", "random_mazes"}
     assert without == no_seeds | {"continuous_causes"}
     assert not any("SEEDS" in modules[name] for name in without)
 

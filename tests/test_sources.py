@@ -32,7 +32,7 @@ FILES = {
 INVOLVED = {
     "lab", "lab.learner", "lab.networks", "lab.activations", "lab.lazy", "lab.deep",
     "lab.deep.inner", "lab.constants", "rl_core", "rl_core.training",
-    "rl_core.checks",
+    "rl_core.checks", "rl_core.kernels", "rl_core.kernels.arrays",
 }  # fmt: skip
 
 

@@ -21,7 +21,7 @@ from numba.extending import overload
 from numpy import copyto
 from numpy.typing import NDArray
 
-from rl_core.checks import distinct_seeds, instance
+from rl_core.checks import distinct_seeds
 from rl_core.kernels.arrays import BYTE, F32
 from rl_core.worlds.names import Make, find, make_environment
 from rl_core.worlds.tasks import Kernel, Task
@@ -341,8 +341,9 @@ def opened(env: Any) -> gymnasium.Env[Any, Any]:
                 f"env must be a function without arguments, got {env!r}: {error}"
             ) from (error)
     allowed = "a Gymnasium id, an import path, a task, an environment or a function that makes one"
-    found: gymnasium.Env[Any, Any] = instance("env", made, gymnasium.Env, allowed)
-    return found
+    if not isinstance(made, gymnasium.Env):
+        raise TypeError(f"env must be {allowed}, got {env!r}")
+    return made
 
 
 def one_seed_of(env: object, seeds: Iterable[int]) -> tuple[int, ...]:
