@@ -81,7 +81,7 @@ captioned(bench[["benchmark", "against", "turns", "note"]], "Table B.2. How each
 # %% [markdown]
 # ## How the cost grows
 #
-# Measured by the same command in processor time, on {glue:text}`growth-date` on: {glue:text}`growth-machine`. REINFORCE trains on MountainCar, every
+# Measured by the same command, in processor time but for Figure B.5, on {glue:text}`growth-date` on: {glue:text}`growth-machine`. REINFORCE trains on MountainCar, every
 # episode stopped at 500 steps, so that each seed and each episode is the same work. Value iteration plans random mazes with three flags.
 
 # %%
@@ -148,15 +148,14 @@ drawings.cores(parts["cores"], law)
 # %% [markdown]
 # :::{container} caption
 # :name: figure-b-5
-# **Figure B.5.** What an experiment, 30 seeds of REINFORCE with 1,000 episodes each, takes against the cores it may use. Dots: measured on one and on two, as
-# the processor time of the process and an equal share of its workers', their start included; dotted: computed from them by Amdahl's
-# law, with the 95% interval of the serial share; dashed: growth in proportion. Data: {download}`CSV <data/growth.csv>`.
+# **Figure B.5.** What an experiment, 30 seeds of REINFORCE with 3,000 episodes each, takes by the clock against the cores it may use, the start
+# of the workers included. Dots: measured on one and on two; dotted: computed from them by Amdahl's law, with the 95% interval of the serial share; dashed: growth in proportion. Data: {download}`CSV <data/growth.csv>`.
 # :::
 #
 # Two cores are measured to be {glue:text}`speed-up-2:.2f` times as fast as one (95%: {glue:text}`speed-up-2-low:.2f` to
 # {glue:text}`speed-up-2-high:.2f`). So by Amdahl's law {glue:text}`serial-share:.0f`% of the work on one core is serial (95%: {glue:text}`serial-low:.0f`% to {glue:text}`serial-high:.0f`%),
 # the start of the workers included. Sixteen cores would then be {glue:text}`speed-up-16:.1f` times as fast ({glue:text}`speed-up-16-low:.1f` to
-# {glue:text}`speed-up-16-high:.1f`). That is computed, not measured, and without what is waited for: cores that share memory or a power budget may do worse. A longer
+# {glue:text}`speed-up-16-high:.1f`). That is computed, not measured: cores that share memory or a power budget may do worse. A longer
 # experiment has a smaller serial share, as its workers start once.
 #
 # ## The whole

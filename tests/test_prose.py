@@ -68,6 +68,8 @@ def settings(path):
     code = [cell.source for cell in jupytext.read(path).cells if cell.cell_type == "code"]
     names = re.findall(r"^from studies import (\w+) as study$", "\n".join(code), re.MULTILINE)
     own = [BOOK / "studies" / f"{name}.py" for name in names]
+    if path.stem == "a2_performance":
+        own += [BOOK / "drawings/performance.py", ROOT / "bench/growth.py"]
     code += [file.read_text() for file in own]
     places = [ROOT / "rl_core" / name.replace(".", "/") for name in imported("\n".join(code))]
     core = [
