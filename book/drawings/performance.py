@@ -49,7 +49,7 @@ def growth(turns: pd.DataFrame, name: str) -> Figure:
 
 def cores(turns: pd.DataFrame, law: Amdahl) -> Figure:
     """Seconds of an experiment against cores: measured at a few, beyond them by Amdahl's law."""
-    figure, axes = _panel("cores", "time without waiting (s, log scale)")
+    figure, axes = _panel("cores", "time by the clock (s, log scale)")
     counts = np.array([1, 2, 4, 8, 16, 32, 64])
     alone = turns.loc[turns["size"] == 1, "seconds"].median()
     axes.plot(counts, alone / counts, color=GREY, ls="--", lw=1, label="in proportion")
