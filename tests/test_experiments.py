@@ -23,7 +23,7 @@ import torch
 import toy_experiment
 import toy_learner
 import toy_task
-from toy_learner import ToyConfig, count_threads, extra_column, learn
+from toy_learner import ToyConfig, count_threads, extra_column, hoard, learn
 
 import rl_core
 from rl_core.dqn import DQNConfig, dqn
@@ -136,6 +136,13 @@ def test_two_workers_give_the_same_bits(tmp_path, backend):
     arms = [PLAIN, BOLD, ACROBOT, CAR, DEEP]
     results = run(arms, seeds=range(6), store=tmp_path, backend=backend, **quiet)
     assert_results_are(results, arms, range(6))
+
+
+def test_a_worker_that_grew_is_replaced_without_a_word(tmp_path):
+    """Warnings are errors here: in the thread that replaces a worker, one would hang the run."""
+    arms = [Arm("hoard", hoard, "CartPole-v1", ToyConfig(seconds=1.1), 1)]
+    results = run(arms, seeds=range(8), store=tmp_path, **quiet)
+    assert sorted(results.table["seed"]) == list(range(8))
 
 
 def test_dask_gives_the_same_bits(tmp_path):

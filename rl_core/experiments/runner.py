@@ -258,9 +258,14 @@ def _joblib(backend: str, workers: int) -> Iterator[joblib.Parallel]:
     limit = {"inner_max_num_threads": 1} if backend == "loky" else {}
     threads = use_threads(1)
     try:
-        with joblib.parallel_config(
-            backend=backend, n_jobs=workers, max_nbytes=None, temp_folder=TEMPORARY, **limit
+        with (
+            joblib.parallel_config(
+                backend=backend, n_jobs=workers, max_nbytes=None, temp_folder=TEMPORARY, **limit
+            ),
+            warnings.catch_warnings(),
         ):
+            # loky replaces a worker that grew. Said as an error, it would end the thread that does.
+            warnings.filterwarnings("ignore", "A worker stopped while some jobs were given")
             try:
                 parallel = joblib.Parallel(batch_size=1, return_as="generator_unordered")
             except ValueError:  # this backend gives all results at the end
