@@ -10,21 +10,39 @@ from drawings.look import BLACK, BLUE, GREY, ORANGE, label
 from studies.performance import Amdahl
 
 MARKS = {"faster": (BLUE, "o"), "cannot tell": (GREY, "s"), "slower": (ORANGE, "v")}
+LABELS = 175  # points that the names of the rivals take
 
 
 def ratios(bench: pd.DataFrame) -> Figure:
-    """How many times as long the rival takes, with its interval, one line a comparison."""
-    figure, axes = plt.subplots(figsize=(8.4, 0.46 * len(bench) + 0.9))
-    places = np.arange(len(bench))[::-1]
-    for place, row in zip(places, bench.itertuples(), strict=True):
+    """How many times as long the rivals take, with intervals, under what they were measured at."""
+    bench = bench.iloc[pd.factorize(bench["benchmark"])[0].argsort(kind="stable")]
+    starts = bench["benchmark"].ne(bench["benchmark"].shift())
+    places = -(np.arange(len(bench)) + 1.2 * starts.cumsum()).to_numpy()
+    figure, axes = plt.subplots(figsize=(5.6, 0.22 * -places[-1] + 0.7))
+    for place, row, first in zip(places, bench.itertuples(), starts, strict=True):
         colour, mark = MARKS[row.verdict]
         axes.plot([row.low, row.high], [place, place], color=colour, ls="-", lw=4, alpha=0.5)
         axes.plot(row.ratio, place, mark, color=colour, ms=6)
-        axes.text(row.high * 1.12, place, f"{row.ratio:g}×", va="center", fontsize=9, color=BLACK)
+        axes.text(row.high * 1.15, place, f"{row.ratio:g}×", va="center", fontsize=9, color=BLACK)
+        if first:
+            axes.annotate(
+                row.benchmark,
+                (0, place + 1),
+                (-LABELS, 0),
+                xycoords=axes.get_yaxis_transform(),
+                textcoords="offset points",
+                va="center",
+                fontsize=9,
+                fontweight="bold",
+                backgroundcolor="white",
+            )
     axes.axvline(1, color=BLACK, lw=1)
-    axes.set_yticks(places, bench["benchmark"] + "\nagainst " + bench["against"], fontsize=8)
+    axes.set_yticks(places, bench["against"], fontsize=9, ha="left")
+    axes.tick_params(axis="y", pad=LABELS, length=0)
+    axes.spines["left"].set_visible(False)
+    axes.set_ylim(places[-1] - 0.8, 0)
     axes.set_xscale("log")
-    axes.set_xlim(min(0.5, bench["low"].min() / 1.3), bench["high"].max() * 3)
+    axes.set_xlim(min(0.5, bench["low"].min() / 1.3), bench["high"].max() * 3.5)
     axes.grid(axis="y", visible=False)
     label(axes, x="cost of the rival ÷ cost of ours (log scale)", y="")
     plt.close(figure)
