@@ -73,13 +73,13 @@ captioned(
 # %% tags=["hide-input"]
 provenance.by_arm(made).to_csv(RESULTS / "provenance.csv", index=False)
 captioned(
-    provenance.by_arm(made).drop(columns=["config", "algorithm"]),
+    provenance.by_arm(made).drop(columns=["config", "algorithm", "environment"]),
     "Table A.2. The arms of all chapters. Seconds of one core, all seeds together; the beginning of the digest of the first seed.",
     formats={"seconds": "{:.1f}"},
 )
 
 # %% [markdown]
-# With configurations: {download}`provenance.csv <../results/provenance.csv>`.
+# With algorithms, environments and configurations: {download}`provenance.csv <../results/provenance.csv>`.
 #
 # ## What was changed afterwards
 #

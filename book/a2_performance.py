@@ -68,15 +68,15 @@ drawings.ratios(ratios)
 
 # %% tags=["hide-input"]
 captioned(
-    bench.drop(columns=["machine", "date", "note", "turns"])
-    .astype({"low": object, "high": object})
-    .fillna(""),
-    "Table B.1. The same in numbers, and the memory. Low and high are the ends of the ratio's interval; what is held against a limit has none.",
-    formats=dict.fromkeys(["rival", "ours", "ratio"], "{:.4g}"),
+    drawings.in_words(bench),
+    "Table B.1. The same in numbers, and the memory. What is held against a limit has no interval.",
+    formats=dict.fromkeys(["rival", "ours"], "{:.4g}"),
 )
 
 # %% tags=["hide-input"]
-captioned(bench[["benchmark", "against", "turns", "note"]], "Table B.2. How each was measured.")
+captioned(
+    bench[["benchmark", "against", "unit", "turns", "note"]], "Table B.2. How each was measured."
+)
 
 # %% [markdown]
 # ## How the cost grows

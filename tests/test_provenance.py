@@ -1,5 +1,6 @@
 """What stands beside a result tells of what ran."""
 
+import importlib.metadata
 import platform
 import sys
 
@@ -21,8 +22,9 @@ def test_versions_are_those_that_run():
         "numba": numba.__version__,
         "numpy": numpy.__version__,
         "pandas": pandas.__version__,
-        "torch": torch.__version__,
+        "torch": importlib.metadata.version("torch"),
     }
+    assert torch.__version__.startswith(versions()["torch"])  # it may add what it was built for
 
 
 def test_the_switches_of_numba_and_the_machine_count(monkeypatch):

@@ -49,6 +49,15 @@ def ratios(bench: pd.DataFrame) -> Figure:
     return figure
 
 
+def in_words(bench: pd.DataFrame) -> pd.DataFrame:
+    """The same as a table: costs, and the ratio with its interval where it has one."""
+    shown = bench[["benchmark", "against", "rival", "ours", "ratio", "verdict"]].copy()
+    interval = bench["low"].map("{:g}".format) + ", " + bench["high"].map("{:g}".format)
+    between = (" [" + interval + "]").where(bench["low"].notna(), "")
+    shown["ratio"] = bench["ratio"].map("{:g}".format) + between
+    return shown.rename(columns={"ratio": "ratio [95%]"})
+
+
 def growth(turns: pd.DataFrame, name: str) -> Figure:
     """Seconds against size on logarithmic axes: every turn, the median, and proportional growth."""
     figure, axes = _panel(name, "processor time (s, log scale)")

@@ -28,7 +28,7 @@ def captioned(
     caption : str
         The caption, beginning with the table's number and a full stop.
     formats : mapping of str to str, optional
-        A format for a column's numbers, such as "{:.2f}".
+        A format for a column's numbers, such as "{:.2f}"; by default six digits at most.
     boldest : sequence of str
         Columns among which the largest of each row is set in bold.
 
@@ -43,7 +43,9 @@ def captioned(
     number = re.sub(r"[^\w.]+", " ", caption.partition(". ")[0]).strip(" .")
     styled = table.style.set_uuid(re.sub(r"[ .]", "-", number.lower()))
     styled = styled.set_caption(html.escape(caption, quote=False)).hide(axis="index")
-    styled = styled.format(dict(formats or {}), escape="html").format_index(escape="html", axis=1)
+    plain = dict.fromkeys(table.select_dtypes("float").columns, "{:g}")
+    styled = styled.format(plain | dict(formats or {}), escape="html")
+    styled = styled.format_index(escape="html", axis=1)
     words = [i for i, kind in enumerate(table.dtypes) if not pd.api.types.is_numeric_dtype(kind)]
     props = {i: f"text-align: left; min-width: {_room(table.iloc[:, i])}" for i in words}
     styled = styled.set_table_styles(
@@ -57,5 +59,5 @@ def captioned(
 def _room(words: pd.Series) -> str:
     """Return the width that a column of words has at least: not every word on a line of its own."""
     longest = max(map(len, words.astype(str)), default=0)
-    most, of_window = (20, 60) if longest > 150 else (16 if words.name == "arm" else 10, 30)
+    most, of_window = (20, 60) if longest > 150 else (14 if words.name == "arm" else 8, 30)
     return f"min({longest / 2:g}em, {most}em, {of_window}vw)"
