@@ -67,9 +67,11 @@ DATA.mkdir(parents=True, exist_ok=True)
 # greedy in the tables; DQN as it was trained, with its random actions, has a table of its own.
 
 # %%
-pd.DataFrame(
-    [{"agent": arm.name, "environment": arm.env, "episodes": arm.episodes} for arm in study.arms()]
-).style.hide(axis="index")
+agents = [(arm.name, arm.env, arm.episodes) for arm in study.arms()]
+captioned(
+    pd.DataFrame(agents, columns=["agent", "environment", "episodes"]),
+    "Table S6.1. The agents, where they trained, and for how many episodes.",
+)
 
 # %%
 results = study.learn(RESULTS / "store")
