@@ -87,10 +87,15 @@ def test_a_table_has_an_address():
     assert '<table id="T_table-3-1">' in page
 
 
+def test_numbers_have_no_empty_digits():
+    page = captioned(pd.DataFrame({"bound": [0.9, 100.0], "n": [1, 2]}), "Table 0.").to_html()
+    assert all(f">{shown}</td>" in page for shown in ("0.9", "100", "1", "2"))
+
+
 def test_words_have_room_and_names_of_arms_more():
     rows = pd.DataFrame({"met": ["yes"], "arm": ["a" * 60], "what": ["a " * 40], "n": [1]})
     page = captioned(rows, "Table 0.").to_html()
-    for width in ("min(1.5em, 10em, 30vw)", "min(30em, 16em, 30vw)", "min(40em, 10em, 30vw)"):
+    for width in ("min(1.5em, 8em, 30vw)", "min(30em, 14em, 30vw)", "min(40em, 8em, 30vw)"):
         assert f"min-width: {width}" in page
     assert page.count("min-width") == 3
 

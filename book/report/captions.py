@@ -3,6 +3,7 @@
 import html
 import re
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import pandas as pd
 from pandas.io.formats.style import Styler
@@ -43,8 +44,8 @@ def captioned(
     number = re.sub(r"[^\w.]+", " ", caption.partition(". ")[0]).strip(" .")
     styled = table.style.set_uuid(re.sub(r"[ .]", "-", number.lower()))
     styled = styled.set_caption(html.escape(caption, quote=False)).hide(axis="index")
-    plain = dict.fromkeys(table.select_dtypes("float").columns, "{:g}")
-    styled = styled.format(plain | dict(formats or {}), escape="html")
+    shown: dict[Any, Any] = dict.fromkeys(table.select_dtypes("float").columns, "{:g}")
+    styled = styled.format(shown | dict(formats or {}), escape="html")
     styled = styled.format_index(escape="html", axis=1)
     words = [i for i, kind in enumerate(table.dtypes) if not pd.api.types.is_numeric_dtype(kind)]
     props = {i: f"text-align: left; min-width: {_room(table.iloc[:, i])}" for i in words}
