@@ -155,7 +155,8 @@ drawings.cores(parts["cores"], law)
 # Two cores are measured to be {glue:text}`speed-up-2:.2f` times as fast as one (95%: {glue:text}`speed-up-2-low:.2f` to
 # {glue:text}`speed-up-2-high:.2f`). So by Amdahl's law {glue:text}`serial-share:.0f`% of the work on one core is serial (95%: {glue:text}`serial-low:.0f`% to {glue:text}`serial-high:.0f`%),
 # the start of the workers included. Sixteen cores would then be {glue:text}`speed-up-16:.1f` times as fast ({glue:text}`speed-up-16-low:.1f` to
-# {glue:text}`speed-up-16-high:.1f`). That is computed, not measured: cores that share memory or a power budget may do worse. A longer
+# {glue:text}`speed-up-16-high:.1f`). That is computed, not measured: cores that share memory or a power budget may do worse.
+# Our guess is that some of what counts as serial here is two cores in each other's way: they may be two threads of one. A longer
 # experiment has a smaller serial share, as its workers start once.
 #
 # ## The whole
