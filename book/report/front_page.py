@@ -137,6 +137,18 @@ def linked(text: str) -> str:
     return re.sub(r"((?:Figure|Table|Film)s? )?(S?\d+(?:\.\d+)?)", link, html.escape(text))
 
 
+def _measured(words: str) -> str:
+    """Estimate and interval on one line; a long one with a digit each, the rest behind the claim.
+
+    >>> _measured("−0.000212 [−0.000938, 0.000181]")
+    '<b>−0.0002</b> <small>[−0.0009, 0.0002]</small>'
+    """
+    if len(words) > 26:
+        words = re.sub(r"0\.\d{4,}", lambda long: f"{float(long[0]):.1g}", words)
+    estimate, _, interval = words.partition(" ")
+    return f"<b>{estimate}</b>" + (f" <small>{interval}</small>" if interval else "")
+
+
 def _first(figures: str) -> str:
     """Of several figures the first; a range is one.
 
@@ -192,7 +204,6 @@ def _said(text: object) -> bool:
 
 def _row(row: pd.Series) -> str:
     decided = _decided(row)
-    interval = f" <small>{str(decided).partition(' ')[2]}</small>".replace(" <small></small>", "")
     claim = f"<details><summary>{html.escape(row['claim'])}</summary>{_rest(row)}</details>"
     if row["verdict"] == "depends on the reading":
         claim += f'<div class="readings">{html.escape(row["readings"])}</div>'
@@ -203,7 +214,7 @@ def _row(row: pd.Series) -> str:
         "id": f'<a href="{PAGES[int(row["chapter"])]}.html#verdicts">{name}</a>',
         "claim of 2018": claim,
         "verdict": _verdict(row["verdict"]),
-        "measured": f"<b>{judged.number(decided.estimate)}</b>{interval}",
+        "measured": _measured(str(decided)),
         "see": linked(_first(row["figure"])),
     }
     return "<tr>" + "".join(f'<td data-label="{k}">{v}</td>' for k, v in cells.items()) + "</tr>"
