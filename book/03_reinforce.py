@@ -32,6 +32,7 @@ from myst_nb import glue
 
 from drawings import look
 from drawings import reinforce as drawings
+from drawings.changed import over_reported
 from report import provenance, settings
 from report.captions import captioned
 from report.claims import details, record, verdicts, what_it_would_take
@@ -158,9 +159,8 @@ glue("near-seeds", len(near.seeds), display=False)
 changed = replace(reported, learning_rate=0.003)
 arm = Arm("changed", reinforce, "Acrobot-v1", changed, episodes=300)
 few = run([arm], seeds=range(3), store=RESULTS / "store", progress=False)
-drawings.over_reported(
-    curves, "Acrobot, as reported", {"changed": study.each_seed(few.table, "changed")}
-)
+acrobot = results.table[results.table["arm"] == "Acrobot, as reported"]
+over_reported(acrobot, {"changed": few.table})
 
 # %% tags=["remove-cell"]
 offer("figure_s3_3", few.table[["seed", "episode", "steps"]])
@@ -186,10 +186,9 @@ glue("parted", parted, display=False)
 glue("torch-seed", int(study.SEEDS[middle]), display=False)
 premise("the engines agree at first", parted > 1)
 offer("figure_s3_4", engines.table[["arm", "seed", "episode", "steps"]])
-drawings.over_reported(
-    curves,
-    "Acrobot, as reported",
-    {name: study.each_seed(engines.table, f"Acrobot, {name}") for name in ("compiled", "torch")},
+over_reported(
+    acrobot,
+    {name: engines.table.query(f"arm == 'Acrobot, {name}'") for name in ("compiled", "torch")},
 )
 
 # %% [markdown]

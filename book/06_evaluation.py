@@ -34,10 +34,15 @@ from myst_nb import glue
 
 from drawings import evaluation as drawings
 from drawings import look
-from report import provenance
+from drawings.changed import over_reported
+from report import provenance, settings
 from report.captions import captioned
 from report.claims import details, record, verdicts, what_it_would_take
+from report.figure_data import offer
 from report.seeds import premise
+from rl_core.experiments import Arm, run
+from rl_core.exploration import EpsilonGreedy, Linear, Trials
+from rl_core.q_learning import QLearningConfig, q_learning
 from studies import evaluation as study
 from studies import evaluation_fresh as again
 
@@ -65,12 +70,32 @@ DATA.mkdir(parents=True, exist_ok=True)
 # An agent can act **as learned**, drawing from the probabilities it has learned as it did in training; or be
 # **greedy**, and always take the action it holds best (for a continuous action: the mean). Agents that learn values are
 # greedy in the tables; DQN as it was trained, with its random actions, has a table of its own.
+#
+# The networks are those of chapters 3 to 5. The tables are Q-learning as in chapter 2, over the cells of a grid. Their settings, as code:
 
 # %%
-agents = [(arm.name, arm.env, arm.episodes) for arm in study.arms()]
+reported = QLearningConfig(
+    gamma=0.99,
+    step_size=0.3,
+    exploration=EpsilonGreedy(Linear(1.0, 0.02, episodes=500)),
+    max_steps=study.TABLE_CAP,
+    max_env_steps=None,
+    evaluation=Trials(every=study.TABLE_EPISODES, episodes=1, max_steps=1),  # done below
+    bins=20,
+    levels=3,  # forces −1, 0 and 1
+)
+assert reported == study.table_config("MountainCarContinuous", study.BEST_BINS)
+
+# %% tags=["hide-input"]
 captioned(
-    pd.DataFrame(agents, columns=["agent", "environment", "episodes"]),
-    "Table S6.1. The agents, where they trained, and for how many episodes.",
+    settings.hyperparameters(reported),
+    "Table S6.1. Every setting of the table on MountainCarContinuous.",
+)
+
+# %% tags=["hide-input"]
+captioned(
+    study.settings_of_arms(),
+    "Table S6.2. Every agent. A table differs from that of Table S6.1; a network trained under a limit from the one without.",
 )
 
 # %%
@@ -83,6 +108,27 @@ provenance.keep(replace(results, provenance=made), RESULTS, chapter=6)
 episodes = study.evaluate_all(results)
 policies = study.by_seed(episodes)
 fresh = again.mean_steps(cars_again, acrobot_again)
+
+# %% [markdown]
+# **Change one thing.** This cell is meant to be edited: replace a setting and run it, and only this arm is trained anew. Here the table
+# chooses among nine forces instead of three.
+
+# %% mystnb={"image": {"alt": "Steps an episode of three seeds of a table with nine forces, in colour, over those of every seed of the table with three, in grey."}}
+changed = replace(reported, levels=9)
+arm = Arm("changed", q_learning, "MountainCarContinuous-v0", changed, study.TABLE_EPISODES)
+few = run([arm], seeds=range(3), store=RESULTS / "store", progress=False)
+as_reported = results.table["arm"] == "MountainCarContinuous, table, 20 bins"
+over_reported(results.table[as_reported], {"changed": few.table})
+
+# %% tags=["remove-cell"]
+offer("figure_s6_4", few.table[["seed", "episode", "steps"]])
+
+# %% [markdown]
+# :::{container} caption
+# :name: figure-s6-4
+# **Figure S6.4.** Three seeds of a table with one setting changed, over every seed as reported (median of the last 100 episodes each, logarithmic), while they
+# learn. Data: {download}`CSV <../results/figures/figure_s6_4.csv>`.
+# :::
 
 # %% tags=["remove-cell"]
 policies.to_csv(DATA / "table_6_1.csv", index=False)

@@ -65,7 +65,7 @@ captioned(
 # All packages, with exact versions, are in `environment.txt`. Another version of any of the libraries in the table means another digest: results are
 # then made again, not read. The version of Python counts too.
 #
-# Do the answers hang on it? The preview was made with Python 3.11, 3.12 and 3.13, from nothing each time, and the three tables of claims compared. They are
+# Do the answers hang on it? The preview was made with Python 3.11, 3.12 and 3.13, and the three tables of claims compared. They are
 # the same to the last digit, but for claim t, which is about time. So versions are kept apart for certainty, not because they are known to differ. Another kind of
 # processor was not tried. Our guess is that last digits may differ there, since compiled code may sum in another order, and with them what chance decides.
 #

@@ -156,7 +156,7 @@ drawings.cores(parts["cores"], law)
 # {glue:text}`speed-up-2-high:.2f`). So by Amdahl's law {glue:text}`serial-share:.0f`% of the work on one core is serial (95%: {glue:text}`serial-low:.0f`% to {glue:text}`serial-high:.0f`%),
 # the start of the workers included. Sixteen cores would then be {glue:text}`speed-up-16:.1f` times as fast ({glue:text}`speed-up-16-low:.1f` to
 # {glue:text}`speed-up-16-high:.1f`). That is computed, not measured: cores that share memory or a power budget may do worse.
-# Our guess is that some of what counts as serial here is two cores in each other's way: they may be two threads of one. A longer
+# Our guess is that some of what counts as serial here is two cores in each other's way. A longer
 # experiment has a smaller serial share, as its workers start once.
 #
 # ## The whole

@@ -218,3 +218,11 @@ def test_gymnasiums_limits(name):
     import gymnasium
 
     assert gymnasium.spec(study.ENV[name]).max_episode_steps == study.LIMIT[name]
+
+
+def test_every_arm_is_told_by_what_differs():
+    told = study.settings_of_arms().set_index("arm")["differs"]
+    assert list(told.index) == [arm.name for arm in study.arms()]
+    assert told["MountainCarContinuous, table, 20 bins"] == told["Acrobot, DQN"] == ""
+    assert told["Acrobot, table, 6 bins"] == "bins=6, levels=None"
+    assert told["MountainCar, DQN, under the limit"] == "max_episode_steps=200"

@@ -141,8 +141,8 @@ def test_two_workers_give_the_same_bits(tmp_path, backend):
 def test_a_worker_that_grew_is_replaced_without_a_word(tmp_path):
     """Warnings are errors here: in the thread that replaces a worker, one would hang the run."""
     arms = [Arm("hoard", hoard, "CartPole-v1", ToyConfig(seconds=1.1), 1)]
-    results = run(arms, seeds=range(8), store=tmp_path, **quiet)
-    assert sorted(results.table["seed"]) == list(range(8))
+    results = run(arms, seeds=range(6), store=tmp_path, **quiet)
+    assert sorted(results.table["seed"]) == [*range(6)]
 
 
 def test_dask_gives_the_same_bits(tmp_path):

@@ -95,7 +95,7 @@ def test_numbers_have_no_empty_digits():
 def test_words_have_room_and_names_of_arms_more():
     rows = pd.DataFrame({"met": ["yes"], "arm": ["a" * 60], "what": ["a " * 40], "n": [1]})
     page = captioned(rows, "Table 0.").to_html()
-    for width in ("min(1.5em, 8em, 30vw)", "min(30em, 14em, 30vw)", "min(40em, 8em, 30vw)"):
+    for width in ("min(1.5em, 6em, 30vw)", "min(30em, 12em, 30vw)", "min(40em, 6em, 30vw)"):
         assert f"min-width: {width}" in page
     assert page.count("min-width") == 3
 

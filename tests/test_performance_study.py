@@ -51,3 +51,21 @@ def test_the_figures_can_be_drawn():
     columns = ["benchmark", "against", "ratio", "low", "high", "verdict"]
     places = drawings.ratios(pd.DataFrame(rows, columns=columns)).axes[0].get_yticklabels()
     assert len(places) == 3
+
+
+def test_a_benchmark_s_rivals_stand_together_under_its_name():
+    rows = [("a", "x", 2.0, 1.5, 2.5), ("b", "y", 3.0, 2.0, 4.0), ("a", "z", 1.5, 1.2, 1.8)]
+    table = pd.DataFrame(rows, columns=["benchmark", "against", "ratio", "low", "high"])
+    (axes,) = drawings.ratios(table.assign(verdict="faster")).axes
+    assert [tick.get_text() for tick in axes.get_yticklabels()] == ["x", "z", "y"]
+    marks = [line.get_xydata()[0] for line in axes.lines if len(line.get_xdata()) == 1]
+    assert [ratio for ratio, _ in marks] == [2.0, 1.5, 3.0]
+    assert [place for _, place in marks] == list(axes.get_yticks())
+
+
+def test_a_ratio_is_told_with_its_interval_where_it_has_one():
+    columns = ["benchmark", "against", "rival", "ours", "ratio", "verdict", "low", "high"]
+    rows = [("a", "x", 4.0, 2.0, 2.0, "faster", 1.5, 2.5)]
+    rows.append(("b", "limit", 200.0, 190.0, 1.05, "within", np.nan, np.nan))
+    told = drawings.in_words(pd.DataFrame(rows, columns=columns))
+    assert told["ratio [95%]"].tolist() == ["2 [1.5, 2.5]", "1.05"]

@@ -41,7 +41,6 @@ from studies.continuous import (
     LEARNED,
     SIGMAS,
     SWEEPS,
-    WINDOW,
     Curves,
 )
 from studies.continuous_fates import FATES
@@ -351,24 +350,6 @@ def profiles(table: pd.DataFrame) -> Figure:
     axes.set_ylim(0, 1)
     label(axes, x="steps at episode 5,000, at most", y="share of seeds")
     figure.legend(loc="outside lower center", ncols=2, fontsize=9)
-    plt.close(figure)
-    return figure
-
-
-def over_reported(curves: Curves, table: pd.DataFrame, text: str) -> Figure:
-    """The seeds of a changed arm over those of the reported one, as far as the first go."""
-    figure, axes = plt.subplots(figsize=(6.4, 4.0))
-    last = int(table["episode"].max())
-    for steps in curves.smooth["as reported"]:
-        axes.plot(np.arange(1, last + 1), steps[:last], color=GREY, ls="-", lw=0.5)
-    for _, rows in table.groupby("seed"):
-        steps = rows["steps"].rolling(WINDOW, min_periods=1).median()
-        axes.plot(rows["episode"], steps, color=VERMILLION, ls="-", lw=1.2)
-    axes.plot([], [], color=GREY, ls="-", lw=0.8, label="as reported, all seeds")
-    axes.plot([], [], color=VERMILLION, ls="-", label=text)
-    axes.set_yscale("log")
-    label(axes, x="episode", y="steps to the goal (log scale)")
-    axes.legend(loc="upper right")
     plt.close(figure)
     return figure
 

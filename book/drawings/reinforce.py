@@ -1,6 +1,6 @@
 """Chapter 3: learning curves over those of 2018, and films of single seeds."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import gymnasium as gym
 import numpy as np
@@ -105,27 +105,6 @@ def profiles(curves: Curves, variants: Mapping[str, str]) -> Figure:
         label(axes, x="steps to the goal (log scale)", y="", title=name)
     panels[0].set_ylabel("share of seeds with at most so many")
     figure.legend(loc="outside lower center", ncols=2, fontsize=9)
-    plt.close(figure)
-    return figure
-
-
-def over_reported(
-    curves: Curves, arm: str, others: Mapping[str, Sequence[tuple[np.ndarray, np.ndarray]]]
-) -> Figure:
-    """Some seeds of other arms, each with its episodes and steps, over those as reported."""
-    figure, axes = plt.subplots(figsize=(6.4, 3.8))
-    last = max(x[-1] for seeds in others.values() for x, _ in seeds)
-    shown = DRAWN[last >= DRAWN]
-    for steps in curves.smooth[arm][:, shown - 1]:
-        axes.plot(shown, steps, color=GREY, ls="-", lw=0.4)
-    axes.plot([], [], color=GREY, ls="-", lw=0.8, label="as reported, every seed")
-    for i, (text, seeds) in enumerate(others.items(), 1):
-        for number, (x, steps) in enumerate(seeds):
-            text = text if number == 0 else None
-            axes.plot(x, steps, color=COLOURS[i], ls=LINES[i - 1], lw=1.4, label=text)
-    axes.set_yscale("log")
-    label(axes, x="episode", y="steps to the goal (log scale)")
-    axes.legend(fontsize=9)
     plt.close(figure)
     return figure
 

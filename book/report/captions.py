@@ -60,5 +60,5 @@ def captioned(
 def _room(words: pd.Series) -> str:
     """Return the width that a column of words has at least: not every word on a line of its own."""
     longest = max(map(len, words.astype(str)), default=0)
-    most, of_window = (20, 60) if longest > 150 else (14 if words.name == "arm" else 8, 30)
+    most, of_window = (20, 60) if longest > 150 else (12 if words.name == "arm" else 6, 30)
     return f"min({longest / 2:g}em, {most}em, {of_window}vw)"

@@ -14,6 +14,7 @@ import pandas as pd
 from joblib import Parallel, delayed
 from scipy.stats import kendalltau
 
+from report import settings
 from report.claims import Claim, Criterion, Evidence, Finding, Reading
 from report.seeds import SEEDS
 from rl_core.dqn import dqn
@@ -126,6 +127,17 @@ def arms() -> list[Arm]:
     under = [limited(environment_of(arm.name), arm) for arm in networks]
     under += [table_arm(name, chosen_bins(name), LIMIT[name]) for name in ENV]
     return [*networks, *tables, *under]
+
+
+def settings_of_arms() -> pd.DataFrame:
+    """Every arm, and where it differs: a table from one, a network from that without a limit."""
+    every = {arm.name: arm for arm in arms()}
+    table = every[f"MountainCarContinuous, table, {BEST_BINS} bins"]
+    rows = []
+    for name, arm in every.items():
+        other = every[name.removesuffix(", under the limit")]
+        rows.append(settings.table([arm], table if arm.algorithm is q_learning else other))
+    return pd.concat(rows, ignore_index=True)
 
 
 def learn(store: Path) -> Results:

@@ -332,15 +332,6 @@ def same_seed(store: Path, seed: int) -> Results:
     return run(arms, seeds=[seed], store=store)
 
 
-def each_seed(table: pd.DataFrame, arm: str) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Episodes and smoothed steps of each seed of an arm."""
-    rows = table[table["arm"] == arm]
-    return [
-        (of["episode"].to_numpy(), of["steps"].rolling(WINDOW, min_periods=1).median().to_numpy())
-        for _, of in rows.groupby("seed")
-    ]
-
-
 def parting(results: Results) -> int:
     """The first episode in which two arms' steps differ; the last if none does."""
     one, other = (rows["steps"].to_numpy() for _, rows in results.table.groupby("arm"))
