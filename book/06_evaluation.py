@@ -80,7 +80,7 @@ reported = QLearningConfig(
     exploration=EpsilonGreedy(Linear(1.0, 0.02, episodes=500)),
     max_steps=study.TABLE_CAP,
     max_env_steps=None,
-    evaluation=Trials(every=study.TABLE_EPISODES, episodes=1, max_steps=1),  # done below
+    evaluation=Trials(every=study.TABLE_EPISODES, episodes=1, max_steps=1),
     bins=20,
     levels=3,  # forces −1, 0 and 1
 )
